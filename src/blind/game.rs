@@ -81,9 +81,7 @@ impl Game {
         let mut truth = Scenario::draw(self.seed, &cell).map_err(told)?;
         for (hidden, (name, size)) in truth.hidden.iter_mut().zip(&sizes) {
             let (base, protocol, width_m) = (self.base, self.protocol, cell.width_m());
-            *hidden = kind_of(name)?
-                .draw_sized(self.seed, base, protocol, width_m, *size)
-                .map_err(told)?;
+            *hidden = kind_of(name)?.draw_sized(self.seed, base, protocol, width_m, *size)?;
         }
         self.blow(&mut truth);
         flyable(&truth)?;

@@ -55,7 +55,7 @@ pub struct Comparison {
     /// Law of leaning by which the wind was read, where no leg told it.
     read_by: LeanLaw,
     /// Air that the simulated side was flown in, show frame, z up, m/s.
-    flown_mps: [f64; 3],
+    pub(super) flown_mps: [f64; 3],
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
@@ -469,6 +469,7 @@ impl Comparison {
         };
         let with_climb = if mean_se_mps > 0.0 {
             climb_shapes(&self.scene, LEAN_FORM_ORDERS)
+                .iter()
                 .map(|shape| {
                     shape.each(|group, drone, bin| {
                         misread(group, drone, bin) * shape.at(group, drone, bin)

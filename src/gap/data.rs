@@ -99,6 +99,11 @@ pub struct Data {
 }
 
 impl Data {
+    /// Number of bins of each group.
+    pub fn bins_of_groups(&self) -> Vec<usize> {
+        self.groups.iter().map(|group| group.bins.len()).collect()
+    }
+
     /// Drones in steady bins of the plan's groups.
     pub fn of_plan(plan: &Plan, flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
         let mut data = Self::default();

@@ -87,18 +87,21 @@ pub(super) fn signals_of(effect: &str) -> &'static [Signal] {
     find(effect).map_or(&[], |effect| effect.definition().signals)
 }
 
-/// Whether two effects depend on a common signal; the model's increments are those of climb.
+/// The model's increments are those of climb.
+fn felt_as(signal: Signal) -> Signal {
+    if signal == Signal::ModelIncrement { Signal::Climb } else { signal }
+}
+
+/// Whether two effects depend on a common signal.
 pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
-    let of = |signal: Signal| if signal == Signal::ModelIncrement { Signal::Climb } else { signal };
-    let is_shared = |signal: &Signal| signals_of(other).iter().any(|one| of(*one) == of(*signal));
+    let is_shared =
+        |signal: &Signal| signals_of(other).iter().any(|one| felt_as(*one) == felt_as(*signal));
     signals_of(one).iter().any(is_shared)
 }
 
-/// Whether an effect depends on nothing that another does not depend on as well: the model's increments are those of
-/// climb, and a drone tilts as it meets the wind.
+/// Whether an effect depends on nothing that another does not depend on as well; a drone tilts as it meets the wind.
 pub(super) fn depends_on_no_more(one: &str, than: &str) -> bool {
-    let of = |signal: Signal| match signal {
-        Signal::ModelIncrement => Signal::Climb,
+    let of = |signal: Signal| match felt_as(signal) {
         Signal::Tilt => Signal::Horizontal,
         signal => signal,
     };

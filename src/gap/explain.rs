@@ -14,6 +14,7 @@ use super::error::GapError;
 use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::lean::LEGS_DOUBT;
+use super::model_flights::ModelFlights;
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
@@ -149,18 +150,21 @@ impl Found {
     }
 }
 
-/// Runs the loop on the drones that are to be fitted. `original` is the model before anything was repaired.
+/// Runs the loop on the drones that are to be fitted. `original` is the model before anything was repaired, `flights` are
+/// those of the model in other searches of the same drones.
 ///
 /// # Errors
 /// See [`GapError`].
-pub fn search(
+pub(super) fn search(
     data: &Data,
     [original, vehicle]: [&Vehicle; 2],
     simulated: &Simulated<'_>,
     plan: Option<&Plan>,
     options: &Options,
+    flights: &ModelFlights,
 ) -> Result<Found, GapError> {
-    let comparison = Comparison::new(data, vehicle, simulated, plan)?;
+    let begin = || Comparison::new(data, vehicle, simulated, plan);
+    let comparison = flights.flown(None, 0.0, begin)?;
     let found = Found::nothing(comparison.clone());
     let lacked_drag = Role::RotorDrag.is_on(vehicle) && !Role::RotorDrag.is_on(original);
     let (refused, last) = (Vec::new(), None);
@@ -171,6 +175,7 @@ pub fn search(
         simulated,
         plan,
         options,
+        flights,
         comparison,
         found,
         refused,
@@ -210,6 +215,7 @@ struct Search<'a> {
     simulated: &'a Simulated<'a>,
     plan: Option<&'a Plan>,
     options: &'a Options,
+    flights: &'a ModelFlights,
     /// The data against the model with what was found so far.
     comparison: Comparison,
     found: Found,
@@ -401,7 +407,7 @@ impl Search<'_> {
         else {
             return Ok(look);
         };
-        let is_asked = self.options.most_steps == 0;
+        let is_asked = self.options.most_steps == 0 && self.options.each_flown;
         if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 && !is_asked {
             return Ok(look);
         }
@@ -471,11 +477,24 @@ impl Search<'_> {
         Some(best.1)
     }
 
+    /// Whether the present model is the one that the search began with.
+    fn has_model(&self) -> bool {
+        self.found.steps.is_empty() && self.found.felt.is_empty()
+    }
+
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
     fn likely_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
+        let fit = || self.fitted_in(updraft_mps, hyper);
+        if !self.has_model() {
+            return fit();
+        }
+        self.flights.likely((&self.comparison, updraft_mps), (hyper, self.found.gusts_mps), fit)
+    }
+
+    fn fitted_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
         let Found { vehicle, parameters, .. } = &self.found;
         let there = self.flown_in(updraft_mps).ok()?;
-        if counts(&there) != counts(&self.comparison) {
+        if there.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
             return None;
         }
         let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
@@ -579,14 +598,15 @@ impl Search<'_> {
                 flown => flown?,
             };
             // Where the model cannot follow the command in that updraft, regressors would lose their bins.
-            let (there, patterns) = if counts(&flown) == counts(&self.comparison) {
-                (flown, patterns)
-            } else if free.is_empty() {
-                let patterns = flown.patterns(&self.found.vehicle, self.found.gusts_mps)?;
-                (flown, patterns)
-            } else {
-                (self.comparison.clone().in_updraft(best.updraft_mps), patterns)
-            };
+            let (there, patterns) =
+                if flown.data.bins_of_groups() == self.comparison.data.bins_of_groups() {
+                    (flown, patterns)
+                } else if free.is_empty() {
+                    let patterns = flown.patterns(&self.found.vehicle, self.found.gusts_mps)?;
+                    (flown, patterns)
+                } else {
+                    (self.comparison.clone().in_updraft(best.updraft_mps), patterns)
+                };
             // What its steady states seemed to explain the model must explain when it is flown.
             let (hyper, updraft_mps) = (best.solution.hyper, best.updraft_mps);
             let again = InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps);
@@ -741,15 +761,12 @@ impl Search<'_> {
     fn flown_in(&self, updraft_mps: f64) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
         let Found { vehicle, felt, .. } = found;
+        let near = Some(&self.comparison);
+        let fly = || Comparison::of(data, vehicle, simulated, *plan, updraft_mps, near);
         let comparison =
-            Comparison::of(data, vehicle, simulated, *plan, updraft_mps, Some(&self.comparison))?;
+            if self.has_model() { self.flights.flown(near, updraft_mps, fly)? } else { fly()? };
         Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
-}
-
-/// Number of bins of each group.
-fn counts(comparison: &Comparison) -> Vec<usize> {
-    comparison.data.groups.iter().map(|group| group.bins.len()).collect()
 }
 
 /// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the
@@ -1105,6 +1122,7 @@ mod tests {
             simulated: &simulated,
             plan: None,
             options: &options,
+            flights: &ModelFlights::default(),
             found: Found::nothing(comparison.clone()),
             comparison,
             refused: Vec::new(),

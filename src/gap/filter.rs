@@ -5,6 +5,11 @@
 //! The filter's gains depend on the noise alone, so one pass of them serves every series and every
 //! regressor.
 
+use smallvec::SmallVec;
+
+/// States that an observation sees, each with its factor; as many as there usually are need no memory of their own.
+pub(super) type LooksAt = SmallVec<[(usize, f64); 12]>;
+
 /// How one state moves between observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State {
@@ -20,7 +25,7 @@ pub(super) struct Observation {
     /// Time of the observation, s; not decreasing.
     pub time_s: f64,
     /// States that the observation sees, each with its factor.
-    pub looks_at: Vec<(usize, f64)>,
+    pub looks_at: LooksAt,
     /// Variance of its white noise.
     pub noise: f64,
 }
@@ -149,6 +154,33 @@ impl Filter {
     }
 }
 
+/// Sum of ln of the innovations' variances, and of their squares over them, of one series: the two terms of its
+/// likelihood.
+pub(super) fn log_det_and_chi2(
+    states: &[State],
+    observations: &[Observation],
+    series: &[f64],
+) -> (f64, f64) {
+    let mut state = vec![0.0; states.len()];
+    let (mut log_det, mut chi2) = (0.0, 0.0);
+    let mut each = observations.iter().zip(series);
+    run(states, observations, |seen| {
+        let Some((observation, value)) = each.next() else { return };
+        for (value, decay) in state.iter_mut().zip(seen.decay) {
+            *value *= decay;
+        }
+        let looks_at = observation.looks_at.iter();
+        let expected: f64 = looks_at.map(|(index, factor)| state[*index] * factor).sum();
+        let innovation = value - expected;
+        for (value, cross) in state.iter_mut().zip(seen.cross) {
+            *value += cross * innovation / seen.variance;
+        }
+        log_det += seen.variance.ln();
+        chi2 += innovation * innovation / seen.variance;
+    });
+    (log_det, chi2)
+}
+
 /// The covariances at one observation.
 pub(super) struct Seen<'a> {
     /// Of the states before it, in rows; only what is not above the diagonal.
@@ -184,12 +216,12 @@ pub(super) fn run(states: &[State], observations: &[Observation], mut tell: impl
             }
         }
         if elapsed_s > 0.0 {
-            for row in 0..dim {
-                for column in 0..=row {
-                    covariance[row * dim + column] *= decay[row] * decay[column];
+            let rows = covariance.chunks_exact_mut(dim.max(1)).zip(states).zip(&decay);
+            for (row, ((values, state), by)) in rows.enumerate() {
+                for (value, decay) in values.iter_mut().zip(&decay[..=row]) {
+                    *value *= by * decay;
                 }
-                let kick = states[row].variance * (1.0 - decay[row] * decay[row]);
-                covariance[row * dim + row] += kick;
+                values[row] += state.variance * (1.0 - by * by);
             }
         }
         for (row, value) in cross.iter_mut().enumerate() {
@@ -203,9 +235,11 @@ pub(super) fn run(states: &[State], observations: &[Observation], mut tell: impl
             + seen.looks_at.iter().map(|(state, factor)| cross[*state] * factor).sum::<f64>();
         let variance = variance.max(f64::MIN_POSITIVE);
         tell(Seen { covariance: &covariance, decay: &decay, cross: &cross, variance });
-        for row in 0..dim {
-            for column in 0..=row {
-                covariance[row * dim + column] -= cross[row] * cross[column] / variance;
+        let rows = covariance.chunks_exact_mut(dim.max(1)).zip(&cross);
+        for (row, (values, by)) in rows.enumerate() {
+            let by = by / variance;
+            for (value, cross) in values.iter_mut().zip(&cross[..=row]) {
+                *value -= by * cross;
             }
         }
     }
@@ -225,7 +259,11 @@ pub(super) mod tests {
         let observations = (0..12)
             .map(|index| Observation {
                 time_s: f64::from(index) * 3.0 + f64::from(index % 3),
-                looks_at: vec![(0, 1.0 + 0.1 * f64::from(index)), (1, 0.5), (2, 1.0)],
+                looks_at: LooksAt::from_slice(&[
+                    (0, 1.0 + 0.1 * f64::from(index)),
+                    (1, 0.5),
+                    (2, 1.0),
+                ]),
                 noise: 0.3,
             })
             .collect();
@@ -260,10 +298,14 @@ pub(super) mod tests {
         assert!((filter.log_det - log_det).abs() < 1e-9, "{} {log_det}", filter.log_det);
         let series: Vec<f64> = (0..12).map(|index| f64::from(index * index % 7)).collect();
         let white = filter.whiten(&series);
+        let (states, observations) = case();
+        let (alone, chi2) = log_det_and_chi2(&states, &observations, &series);
+        assert!((alone - log_det).abs() < 1e-9, "{alone} {log_det}");
         let ours: f64 = white.iter().map(|value| value * value).sum();
         let vector = DVector::from_vec(series.clone());
         let theirs = vector.dot(&dense.solve(&vector));
         assert!((ours - theirs).abs() < 1e-9 * theirs, "{ours} {theirs}");
+        assert!((chi2 - theirs).abs() < 1e-9 * theirs, "{chi2} {theirs}");
         for (weighed, solved) in filter.weigh(&series).iter().zip(dense.solve(&vector).iter()) {
             assert!((weighed - solved).abs() < 1e-9, "{weighed} {solved}");
         }

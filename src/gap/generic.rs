@@ -96,26 +96,33 @@ const FORM_WIND_ORDERS: RangeInclusive<usize> = 1..=2;
 
 /// Shapes by which a flight may differ from any model of its kind, as regressors of one standard deviation each.
 pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
-    let shapes = |of: fn(&Signals) -> f64, orders, least_span: f64| {
-        let along: Vec<Vec<f64>> =
-            scene.signals.iter().map(|group| group.iter().map(of).collect()).collect();
-        let shows = span(&along).is_finite() && span(&along) > least_span;
-        if shows { polynomials(&along, orders, FORM_US) } else { Vec::new() }
-    };
-    let of_wind = shapes(|signals| signals.horizontal_mps, FORM_WIND_ORDERS, 1.5);
-    [shapes(|signals| signals.climb_mps, FORM_ORDERS, 0.5), of_wind].concat()
+    let wind = Along { of: |signals| signals.horizontal_mps, least_span: 1.5 };
+    let of_wind = wind.shapes(scene, FORM_WIND_ORDERS, FORM_US);
+    [CLIMB.shapes(scene, FORM_ORDERS, FORM_US), of_wind].concat()
 }
 
 /// Chebyshev polynomials over the climb; none where a flight spans too little of it.
-pub(super) fn climb_shapes(
-    scene: &Scene,
-    orders: RangeInclusive<usize>,
-) -> impl Iterator<Item = Column> {
-    let climb: Vec<Vec<f64>> =
-        scene.signals.iter().map(|group| group.iter().map(|s| s.climb_mps).collect()).collect();
-    let shows = span(&climb).is_finite() && span(&climb) > 0.5;
-    let shapes = if shows { polynomials(&climb, orders, 1.0) } else { Vec::new() };
-    shapes.into_iter()
+pub(super) fn climb_shapes(scene: &Scene, orders: RangeInclusive<usize>) -> Vec<Column> {
+    CLIMB.shapes(scene, orders, 1.0)
+}
+
+/// What shapes run along: a signal, and the least span of it that tells them apart.
+struct Along {
+    of: fn(&Signals) -> f64,
+    least_span: f64,
+}
+
+/// Along the climb, m/s.
+const CLIMB: Along = Along { of: |signals| signals.climb_mps, least_span: 0.5 };
+
+impl Along {
+    /// Chebyshev polynomials of a size; none where a flight spans too little.
+    fn shapes(&self, scene: &Scene, orders: RangeInclusive<usize>, size: f64) -> Vec<Column> {
+        let along: Vec<Vec<f64>> =
+            scene.signals.iter().map(|group| group.iter().map(self.of).collect()).collect();
+        let shows = span(&along).is_finite() && span(&along) > self.least_span;
+        if shows { polynomials(&along, orders, size) } else { Vec::new() }
+    }
 }
 
 /// Chebyshev polynomials over the range of a signal, of a size.

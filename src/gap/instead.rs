@@ -7,7 +7,6 @@
 use rayon::prelude::*;
 
 use super::contest::PRODUCT_NATS;
-use super::data::Data;
 use super::decide::{CLASS_NATS, margin_nats};
 use super::dependence::depends_on_no_more;
 use super::error::GapError;
@@ -37,11 +36,11 @@ pub(super) fn fewer_instead(
     options: &Options,
     flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
 ) -> Result<Found, GapError> {
-    let bins = bins_of(&found.comparison.data);
+    let bins = found.comparison.data.bins_of_groups();
     let ended = |options: &Options| -> Option<Ended> {
         let found = flown(options).ok()?;
-        let is_alike =
-            found.steps.len() == options.most_steps && bins_of(&found.comparison.data) == bins;
+        let is_alike = found.steps.len() == options.most_steps
+            && found.comparison.data.bins_of_groups() == bins;
         let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
         is_alike.then_some(Ended { found, nats })
     };
@@ -58,11 +57,6 @@ pub(super) fn fewer_instead(
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     let nats = found.explains()?;
     Ok(decided(Ended { found, nats }, others))
-}
-
-/// Number of bins of each group.
-fn bins_of(data: &Data) -> Vec<usize> {
-    data.groups.iter().map(|group| group.bins.len()).collect()
 }
 
 /// Effects of the library that explained much where something was found, those that explained most first.
@@ -172,7 +166,7 @@ fn of(names: Vec<String>, finding: &Finding) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::super::trial;
-    use super::super::verdict::{Rest, Rival};
+    use super::super::verdict::Rest;
     use super::*;
 
     /// A search that ended with these effects, the classes among them written with a slash.
@@ -186,26 +180,10 @@ mod tests {
     fn step(names: &str, gain_nats: f64, rivals: &[(&str, f64)]) -> Step {
         let effects: Vec<String> = names.split('/').map(str::to_owned).collect();
         let finding = match &effects[..] {
-            [effect] => {
-                Finding::Name { effect: effect.clone(), parameters: Vec::new(), was_there: false }
-            }
+            [effect] => trial::name(effect),
             _ => Finding::Class { effects, parameters: Vec::new() },
         };
-        let rival = |(name, gain_nats): &(&str, f64)| Rival {
-            name: (*name).to_owned(),
-            generic: *name == "climb",
-            gain_nats: *gain_nats,
-        };
-        Step {
-            finding,
-            gain_nats,
-            threshold_nats: 8.0,
-            alpha: 0.005,
-            size_us: 5.0,
-            rivals: rivals.iter().map(rival).collect(),
-            shape: None,
-            in_field: None,
-        }
+        trial::step(finding, gain_nats, rivals)
     }
 
     fn told(there: Ended, others: Vec<Ended>) -> Vec<String> {

@@ -6,6 +6,7 @@ use super::error::GapError;
 use super::explain::{Found, Options, search};
 use super::heldout::Case;
 use super::instead::fewer_instead;
+use super::model_flights::ModelFlights;
 use super::verdict::{Finding, Gap, Step};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -31,6 +32,8 @@ pub(super) struct Question<'a> {
     pub plan: Option<&'a Plan>,
     /// Options of the search.
     pub options: &'a Options,
+    /// Flights of the model that were flown for it so far.
+    pub flights: &'a ModelFlights,
 }
 
 impl Question<'_> {
@@ -73,11 +76,12 @@ impl Question<'_> {
             }
         }
         if !found.steps.is_empty() {
-            let flown = |options: &Options| {
-                search(train, [self.original, self.repaired], self.simulated, self.plan, options)
-            };
+            let flown = |options: &Options| self.search(train, options);
+            let before = found.steps.clone();
             found = fewer_instead(found, self.options, flown)?;
-            gap = self.case(&found).gap(train, held)?;
+            if found.steps != before {
+                gap = self.case(&found).gap(train, held)?;
+            }
         }
         if !grows(&gap) {
             return Ok((found, gap));
@@ -100,14 +104,18 @@ impl Question<'_> {
         Ok(in_air(found.updraft_mps)? > WORSE * in_air(0.0)?)
     }
 
+    fn search(self, train: &Data, options: &Options) -> Result<Found, GapError> {
+        let models = [self.original, self.repaired];
+        search(train, models, self.simulated, self.plan, options, self.flights)
+    }
+
     fn searched(
         self,
         train: &Data,
         held: &Data,
         options: Options,
     ) -> Result<(Found, Gap), GapError> {
-        let found =
-            search(train, [self.original, self.repaired], self.simulated, self.plan, &options)?;
+        let found = self.search(train, &options)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
     }
@@ -160,31 +168,17 @@ fn withdrawn(mut step: Step) -> Option<Step> {
 #[cfg(test)]
 mod tests {
     use super::super::dependence::Dependence;
-    use super::super::verdict::{Interval, Rival, Shrink};
+    use super::super::trial::{self, name};
+    use super::super::verdict::{Interval, Shrink};
     use super::*;
 
     fn step(finding: Finding, rivals: &[&str]) -> Step {
-        let rival =
-            |name: &&str| Rival { name: (*name).to_owned(), generic: false, gain_nats: 9.0 };
-        Step {
-            finding,
-            gain_nats: 10.0,
-            threshold_nats: 8.0,
-            alpha: 0.005,
-            size_us: 5.0,
-            rivals: rivals.iter().map(rival).collect(),
-            shape: None,
-            in_field: None,
-        }
+        let rivals: Vec<(&str, f64)> = rivals.iter().map(|name| (*name, 9.0)).collect();
+        trial::step(finding, 10.0, &rivals)
     }
 
     #[test]
     fn what_is_withdrawn_is_never_a_name() {
-        let name = |effect: &str| Finding::Name {
-            effect: effect.to_owned(),
-            parameters: Vec::new(),
-            was_there: false,
-        };
         let effects = |step: Option<Step>| {
             step.map(|step| step.finding.effects().join(" ")).unwrap_or_default()
         };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 
 use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
-use super::filter::{Filter, Observation, State};
+use super::filter::{Filter, LooksAt, Observation, State};
 use super::lean_fit::{Fitted, Point, fit, hovering_wind};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
@@ -437,7 +437,7 @@ fn smoothed(group: &Group, values: &[f64]) -> Vec<f64> {
     let filter = |time_s: f64, share: f64| {
         let seen = |time_s: &f64| Observation {
             time_s: *time_s,
-            looks_at: vec![(0, 1.0)],
+            looks_at: LooksAt::from_slice(&[(0, 1.0)]),
             noise: variance * share,
         };
         let gusts = State { variance: variance * (1.0 - share), time_s };

@@ -5,7 +5,7 @@ use nalgebra::SMatrix;
 use rayon::prelude::*;
 
 use super::bins::Bin;
-use super::filter::{Filter, Observation, State};
+use super::filter::{Observation, State, log_det_and_chi2};
 use super::lean::LeanLaw;
 use super::minimise::{differences, minimise};
 use crate::numeric::mean;
@@ -185,14 +185,13 @@ fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> 
             off.push(point.lean_rad[axis] - wanted[axis]);
         }
     }
-    let filter = Filter::new(vec![gust, gust, shear], seen);
+    let (log_det, chi2) = log_det_and_chi2(&[gust, gust, shear], &seen, &off);
     let square = |value: f64| value * value;
-    let chi2: f64 = filter.whiten(&off).into_iter().map(square).sum();
     let known = square((of.law.square.max(1e-7) / square_part).ln() / SQUARE_DOUBT)
         + square((of.law.linear - linear) / LINEAR_DOUBT)
         + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
         + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln());
-    0.5 * (filter.log_det + chi2 + known)
+    0.5 * (log_det + chi2 + known)
 }
 
 /// Cost of a law by which a drone would lean against the wind, nats.

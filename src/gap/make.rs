@@ -11,6 +11,7 @@ use super::explain::{Found, Options};
 use super::heldout::same_bins;
 use super::kept::Question;
 use super::left_out::LeftOut;
+use super::model_flights::ModelFlights;
 use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
     SIDE_GUSTS, SLOPES, WHITE,
@@ -125,6 +126,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         simulated: &simulated,
         plan: input.plan,
         options,
+        flights: &ModelFlights::default(),
     };
     let (mut found, shrink) = question.answered(&train, &held)?;
     if shrink.left_over().is_some() {

@@ -31,6 +31,7 @@ mod make;
 mod map_gain;
 mod measure;
 mod minimise;
+mod model_flights;
 pub mod next;
 mod noise;
 #[cfg(test)]
@@ -59,7 +60,7 @@ pub use data::{Data, Flown};
 pub use dependence::Dependence;
 pub use difficulty::{SteadyPulse, There, fisher_z};
 pub use error::GapError;
-pub use explain::{Found, Options, search};
+pub use explain::{Found, Options};
 pub use left_out::LeftOut;
 pub use make::{Explained, Input, explain};
 pub use map_gain::{Measured, map_gain};

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::numeric;
 
-use super::filter::{Filter, Observation, State};
+use super::filter::{Filter, LooksAt, Observation, State};
 use super::response::{Response, gusts_mps};
 use super::slopes::Slopes;
 
@@ -255,15 +255,13 @@ impl Whitener {
             groups.iter().map(|group| group.own_responses(hyper)).collect();
         let looks = |index: usize, bin: usize, first: usize| {
             let response = own_responses[index][bin];
-            let mut looks_at = Vec::with_capacity(OWN_STATES + SHARED_STATES);
-            looks_at.extend([
+            LooksAt::from_slice(&[
                 (first, response),
                 (first + 1, response),
                 (first + 2, 1.0),
                 (first + 3, groups[index].slope_us[bin]),
                 (first + 4, 1.0),
-            ]);
-            looks_at
+            ])
         };
         let mut order: Vec<(usize, usize)> = groups
             .iter()

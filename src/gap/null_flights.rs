@@ -145,6 +145,22 @@ fn independent_errors_name_something_on_most_null_flights_and_the_search_on_hard
     assert!(by_search.len() <= 1, "the search named {by_search:?}");
 }
 
+#[test]
+fn what_leans_misread_in_climb_is_in_doubt_where_the_pulse_feels_the_wind() {
+    let (plan, mut vehicle) = (plan(), builtin("airsim-generic-quad").unwrap());
+    set(&mut vehicle, "translational-lift", "inflow_share", 0.2);
+    let with = comparison(&plan, &vehicle);
+    let doubts = with.wind_doubts(&vehicle).unwrap();
+    // What goes with the climb is told from what goes with the wind: of another sign in descent.
+    let bins = &with.data.groups[0].bins;
+    let at = |doubt: &Column, up: bool| {
+        let of = bins.iter().enumerate().filter(|(_, bin)| (bin.climb_mps() > 1.0) == up);
+        let of = of.filter(|(_, bin)| bin.climb_mps().abs() > 1.0);
+        of.map(|(bin, _)| doubt.at(0, 0, bin)).sum::<f64>()
+    };
+    assert!(doubts.iter().any(|doubt| at(doubt, true) * at(doubt, false) < 0.0));
+}
+
 /// Flights with inflow. Chosen for time.
 const FEW: u64 = 8;
 

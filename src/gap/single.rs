@@ -161,27 +161,13 @@ pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>
 
 #[cfg(test)]
 mod tests {
-    use super::super::trial;
+    use super::super::trial::{self, name};
     use super::*;
     use crate::gap::refine::size_of;
 
     fn step(finding: Finding, gain_nats: f64, size_us: f64, rivals: &[&str]) -> Step {
-        let rival =
-            |name: &&str| Rival { name: (*name).to_owned(), generic: false, gain_nats: 9.0 };
-        Step {
-            finding,
-            gain_nats,
-            threshold_nats: 8.0,
-            alpha: 0.005,
-            size_us,
-            rivals: rivals.iter().map(rival).collect(),
-            shape: None,
-            in_field: None,
-        }
-    }
-
-    fn name(effect: &str) -> Finding {
-        Finding::Name { effect: effect.to_owned(), parameters: Vec::new(), was_there: false }
+        let rivals: Vec<(&str, f64)> = rivals.iter().map(|name| (*name, 9.0)).collect();
+        Step { size_us, ..trial::step(finding, gain_nats, &rivals) }
     }
 
     fn unknown(depends_on: Dependence) -> Finding {

@@ -6,7 +6,8 @@ use super::data::{Data, Group};
 use super::noise::{GroupPattern, Hyper};
 use super::response::Response;
 use super::search::Ranked;
-use crate::effects::{Model, Signals};
+use super::verdict::{Finding, Rival, Step};
+use crate::effects::{Model, Signals, find};
 use crate::mission::plan::SegmentKind;
 use crate::vehicle::Vehicle;
 use crate::vehicle::library::builtin;
@@ -111,4 +112,28 @@ pub(super) fn ranked(candidate: usize, gain: f64) -> Ranked {
         hyper: Hyper::default(),
         fitted: true,
     }
+}
+
+/// A finding that gained so much, with rivals; one that is no effect of the library is a free shape.
+pub(super) fn step(finding: Finding, gain_nats: f64, rivals: &[(&str, f64)]) -> Step {
+    let rival = |(name, gain_nats): &(&str, f64)| Rival {
+        name: (*name).to_owned(),
+        generic: find(name).is_none(),
+        gain_nats: *gain_nats,
+    };
+    Step {
+        finding,
+        gain_nats,
+        threshold_nats: 8.0,
+        alpha: 0.005,
+        size_us: 5.0,
+        rivals: rivals.iter().map(rival).collect(),
+        shape: None,
+        in_field: None,
+    }
+}
+
+/// A new effect that is named alone.
+pub(super) fn name(effect: &str) -> Finding {
+    Finding::Name { effect: effect.to_owned(), parameters: Vec::new(), was_there: false }
 }

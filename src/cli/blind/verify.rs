@@ -45,30 +45,19 @@ pub(super) fn run(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandE
     }
     // What is not on standard output goes to the other.
     if context.quiet || context.json {
-        for (check, problem) in wrong(&verified) {
-            context.warn(&sentence(&check.file, problem));
+        for wrong in verified.checks.iter().filter_map(Check::wrong) {
+            context.warn(&wrong);
         }
     }
     Ok(if verified.intact { Exit::Done } else { Exit::Unsafe })
 }
 
-/// Parts with which something is wrong, and what.
-fn wrong(verified: &Verification) -> impl Iterator<Item = (&Check, &str)> {
-    let checks = verified.checks.iter();
-    checks.filter_map(|check| check.problem.as_deref().map(|problem| (check, problem)))
-}
-
-/// A problem with its file, which some problems name themselves.
-fn sentence(file: &str, problem: &str) -> String {
-    if problem.contains(file) { problem.to_owned() } else { format!("{file}: {problem}") }
-}
-
 fn text(verified: &Verification) -> String {
     let mut text = String::new();
     for check in &verified.checks {
-        let _ = match &check.problem {
+        let _ = match check.wrong() {
             None => writeln!(text, "ok     {}  {}", check.file, check.holds),
-            Some(problem) => writeln!(text, "WRONG  {}", sentence(&check.file, problem)),
+            Some(wrong) => writeln!(text, "WRONG  {wrong}"),
         };
     }
     let _ = writeln!(text, "SHA-256 that the truth is held against: {}", verified.truth_sha256);

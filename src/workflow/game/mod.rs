@@ -12,7 +12,6 @@ pub mod verify;
 use std::path::{Path, PathBuf};
 
 use super::error::WorkflowError;
-use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
 use crate::blind::BlindError;
 use crate::blind::game::{GAME_SCHEMA, GameFile};
@@ -36,11 +35,8 @@ pub(crate) fn record_path(folder: &Path) -> PathBuf {
 /// What the player was given.
 fn read_game(folder: &Path) -> Result<GameFile, WorkflowError> {
     let path = game_path(folder);
-    if !folder.exists() {
-        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
-        return Err(BlindError::from(FileError::new("read", folder, missing)).into());
-    }
-    if !path.exists() {
+    // A folder that is missing is told as what cannot be read.
+    if folder.exists() && !path.exists() {
         return Err(WorkflowError::Nothing(format!(
             "{} is no game: it has no {GAME}; make one with `updraft blind hide -o FOLDER`",
             folder.shown()

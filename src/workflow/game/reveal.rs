@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{files, game_path, read_game, record_path, verify};
+use super::verify::{self, Check};
+use super::{files, game_path, read_game, record_path};
 use crate::base::digest::sha256;
 use crate::base::file::{read_whole, write_whole};
 use crate::base::plain::Shown as _;
@@ -105,10 +106,7 @@ fn opened_before(path: &Path, verdict_sha256: &str) -> Result<BlindRecord, Workf
 /// Refuses a game of which something was altered after its seal was opened: its record proves nothing.
 fn still_whole(folder: &Path) -> Result<(), WorkflowError> {
     let verified = verify::run(folder, None)?;
-    let altered = verified.checks.iter().find_map(|check| {
-        check.problem.as_ref().map(|problem| format!("{} {problem}", check.file))
-    });
-    match altered {
+    match verified.checks.iter().find_map(Check::wrong) {
         Some(altered) => Err(WorkflowError::Usage(format!(
             "{altered}; the seal was opened before, but what lies here is not what it was opened for"
         ))),

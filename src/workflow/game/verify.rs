@@ -49,6 +49,15 @@ pub struct Check {
     pub problem: Option<String>,
 }
 
+impl Check {
+    /// What is wrong with it, in a sentence; some problems name the file themselves.
+    pub fn wrong(&self) -> Option<String> {
+        let problem = self.problem.as_ref()?;
+        let is_told = problem.contains(&self.file);
+        Some(if is_told { problem.clone() } else { format!("{} {problem}", self.file) })
+    }
+}
+
 /// Checks of a game, as they are made.
 struct Checks<'a> {
     folder: &'a Path,
