@@ -227,6 +227,7 @@ mod tests {
         updraft: true,
         each_flown: false,
         only: None,
+        rest: true,
     };
 
     /// Two effects that look alike, one that looks like neither, and free shapes.

@@ -1,5 +1,7 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use super::candidates::{
@@ -46,6 +48,8 @@ pub struct Options {
     pub each_flown: bool,
     /// Name of the only effect that may come first; `None`: whatever explains most.
     pub only: Option<&'static str>,
+    /// Whether it is sought what is left at the end.
+    pub rest: bool,
 }
 
 impl Default for Options {
@@ -58,6 +62,7 @@ impl Default for Options {
             updraft: true,
             each_flown: false,
             only: None,
+            rest: true,
         }
     }
 }
@@ -247,6 +252,8 @@ struct Look {
     candidates: Vec<Candidate>,
     generics: Vec<Generic>,
     drones: Vec<usize>,
+    /// What explains how much, once it is computed.
+    round: OnceLock<Round>,
 }
 
 /// How well a look's air and noise explain the flight, with the best effect.
@@ -261,13 +268,17 @@ struct Explained {
 
 impl Look {
     fn explained(&self) -> Explained {
-        let round = round(&self.problem(), self.hyper, self.sought(), true);
+        let round = self.round();
         let by_effect = (round.best() - FLOOR_NATS).max(0.0);
         Explained {
             nats: round.base.log_posterior() + by_effect,
             lacks_effect: by_effect > 0.0,
             lacks_shape: round.best_generic() > FREE_FLOOR_NATS,
         }
+    }
+
+    fn round(&self) -> &Round {
+        self.round.get_or_init(|| round(&self.problem(), self.hyper, self.sought(), true))
     }
 
     fn problem(&self) -> Problem<'_> {
@@ -293,8 +304,13 @@ impl Search<'_> {
         } else {
             look
         };
-        let (problem, sought) = (look.problem(), look.sought());
-        let round = round(&problem, look.hyper, sought, true);
+        if step == self.options.most_steps && !self.options.rest {
+            self.found.hyper = look.hyper;
+            self.found.comparison = self.comparison.clone();
+            return Ok(false);
+        }
+        let (round, sought) = (look.round(), look.sought());
+        let problem = look.problem();
         let problem = problem.among(&round.groups);
         let likely = round.base.log_posterior();
         if let Some((before, was)) = self.last.take()
@@ -309,19 +325,19 @@ impl Search<'_> {
         self.found.hyper = round.base.hyper;
         let wind_mps = self.comparison.wind.mean_mps;
         let material_us = material_us(&look.patterns, &round.base.hyper, wind_mps);
-        let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
+        let mut decision = decide(&problem, round, sought, material_us, self.options, step);
         let (found, comparison) = (&self.found, &self.comparison);
-        let contest = Contest { found, comparison, sought, round: &round };
+        let contest = Contest { found, comparison, sought, round };
         decision.what = contest.settle(&problem, decision.what)?;
         if comparison.is_foreign() && found.steps.is_empty() {
             decision.what = contest.together(&problem, decision.what)?;
         }
-        self.found.rest = rest(&round, sought, &decision.thresholds);
+        self.found.rest = rest(round, sought, &decision.thresholds);
         if step == self.options.most_steps || matches!(decision.what, What::Nothing) {
             self.found.comparison = self.comparison.clone();
             return Ok(false);
         }
-        let rivals = rivals(&round, sought);
+        let rivals = rivals(round, sought);
         match decision.what {
             What::Nothing => {}
             What::Effects { members, or_else } => {
@@ -331,7 +347,7 @@ impl Search<'_> {
                 let threshold_nats = decision.thresholds.library;
                 let best = &members[0];
                 let candidate = &look.candidates[best.candidate];
-                self.take_effect(candidate, best, &round, names, (threshold_nats, rivals))?;
+                self.take_effect(candidate, best, round, names, (threshold_nats, rivals))?;
             }
             What::Together { members, instead } => {
                 let name = |candidate: usize| look.candidates[candidate].name.to_owned();
@@ -339,7 +355,7 @@ impl Search<'_> {
                     let of = member.candidate;
                     let names = std::iter::once(of).chain(instead).map(name).collect();
                     let told = (decision.thresholds.library, rivals.clone());
-                    self.take_effect(&look.candidates[of], member, &round, names, told)?;
+                    self.take_effect(&look.candidates[of], member, round, names, told)?;
                 }
             }
             What::Free(free) => {
@@ -561,7 +577,17 @@ impl Search<'_> {
         }
         let drones = comparison.data.counts();
         let hyper = quick.hyper;
-        Ok(Look { patterns, residual, free, doubts, hyper, candidates, generics, drones })
+        Ok(Look {
+            patterns,
+            residual,
+            free,
+            doubts,
+            hyper,
+            candidates,
+            generics,
+            drones,
+            round: OnceLock::new(),
+        })
     }
 
     /// Goes into the updraft that the whole flight most probably is in: where the response is curved, that

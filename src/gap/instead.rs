@@ -24,6 +24,14 @@ const SHARE: f64 = 0.5;
 struct Ended {
     found: Found,
     nats: f64,
+    /// The effect that alone was searched for, if it was one.
+    only: Option<&'static str>,
+}
+
+/// What is to be told: a search that ended, and the names of its finding if that is the only one.
+struct Decided {
+    ended: Ended,
+    names: Vec<String>,
 }
 
 /// What explains a flight best: what was found, one effect in its place, or nothing. Effects that explain it as well as a
@@ -39,24 +47,33 @@ pub(super) fn fewer_instead(
     let bins = found.comparison.data.bins_of_groups();
     let ended = |options: &Options| -> Option<Ended> {
         let found = flown(options).ok()?;
+        let only = options.only;
         let is_alike = found.steps.len() == options.most_steps
             && found.comparison.data.bins_of_groups() == bins;
         let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
-        is_alike.then_some(Ended { found, nats })
+        is_alike.then_some(Ended { found, nats, only })
     };
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let alone = rivals(&found.steps);
-    let alone = alone.iter().map(|name| Options {
-        only: Some(name),
-        most_steps: 1,
-        replicates: 0,
-        ..*options
-    });
+    let by = |name: &'static str| {
+        let only = Some(name);
+        Options { only, most_steps: 1, replicates: 0, rest: false, ..*options }
+    };
+    let alone = alone.into_iter().map(by);
     let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     let nats = found.explains()?;
-    Ok(decided(Ended { found, nats }, others))
+    let Decided { ended, names } = decided(Ended { found, nats, only: None }, others);
+    let mut found = match ended.only {
+        // What is left beside it is sought only now.
+        Some(name) => flown(&Options { rest: true, ..by(name) })?,
+        None => ended.found,
+    };
+    if let [step] = &mut found.steps[..] {
+        step.finding = of(names, &step.finding);
+    }
+    Ok(found)
 }
 
 /// Effects of the library that explained much where something was found, those that explained most first.
@@ -99,16 +116,17 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
 }
 
 /// Holds what was found against fewer findings, best first.
-fn decided(there: Ended, mut others: Vec<Ended>) -> Found {
+fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
+    let as_it_is = |ended: Ended| Decided { ended, names: Vec::new() };
     let is_single = there.found.steps.len() == 1;
-    let Some(first) = others.first() else { return there.found };
+    let Some(first) = others.first() else { return as_it_is(there) };
     // Where something would be found after all it is not nothing.
     let is_all = first.found.rest.gain_nats <= first.found.rest.threshold_nats;
     if first.nats >= there.nats && first.found.steps.is_empty() && is_all {
-        return others.swap_remove(0).found;
+        return as_it_is(others.swap_remove(0));
     }
     others.retain(|other| !other.found.steps.is_empty());
-    let Some(best) = others.first() else { return there.found };
+    let Some(best) = others.first() else { return as_it_is(there) };
     let gain = |of: &Found| of.steps.iter().map(|step| step.gain_nats).fold(0.0, f64::max);
     // One effect that was not found before is simpler than several of its kind, if it explains nearly as much.
     let known = leads(&there.found);
@@ -119,11 +137,11 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Found {
     let simpler_nats = if is_simpler { CLASS_NATS } else { 0.0 };
     let is_instead = best.nats > there.nats - simpler_nats;
     if !is_single && !is_instead {
-        return there.found;
+        return as_it_is(there);
     }
     let is_unknown = there.found.steps.iter().all(|step| step.finding.effects().is_empty());
     if is_unknown && !is_instead {
-        return there.found;
+        return as_it_is(there);
     }
     let most = best.nats.max(there.nats);
     let near_nats = most - margin_nats(gain(if is_instead { &best.found } else { &there.found }));
@@ -140,11 +158,8 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Found {
             names.push(name);
         }
     }
-    let mut found = if is_instead { others.swap_remove(0).found } else { there.found };
-    if let [step] = &mut found.steps[..] {
-        step.finding = of(names, &step.finding);
-    }
-    found
+    let ended = if is_instead { others.swap_remove(0) } else { there };
+    Decided { ended, names }
 }
 
 /// The first name of each finding.
@@ -174,7 +189,7 @@ mod tests {
         let data = trial::data(2, |_, _| 0.0);
         let mut found = Found::nothing(trial::comparison(&data));
         found.steps = findings.iter().map(|names| step(names, 20.0, &[])).collect();
-        Ended { found, nats }
+        Ended { found, nats, only: None }
     }
 
     fn step(names: &str, gain_nats: f64, rivals: &[(&str, f64)]) -> Step {
@@ -187,8 +202,9 @@ mod tests {
     }
 
     fn told(there: Ended, others: Vec<Ended>) -> Vec<String> {
-        let found = decided(there, others);
-        found.steps.iter().map(|step| step.finding.effects().join("/")).collect()
+        let Decided { ended, names } = decided(there, others);
+        let own = ended.found.steps.iter().map(|step| step.finding.effects().join("/")).collect();
+        if ended.found.steps.len() == 1 && names.len() > 1 { vec![names.join("/")] } else { own }
     }
 
     #[test]
