@@ -99,6 +99,8 @@ fn flyable(data: &Data, law: LeanLaw, wind_mps: [f64; 2]) -> [f64; 2] {
 
 /// Times that the wind is read again after it was flown in, at most. Numerical.
 const READINGS: usize = 3;
+/// As [`READ_WITHIN_MPS`], without legs: hovers hardly show what wind they were flown in. Chosen.
+const HOVERS_READ_WITHIN_MPS: f64 = 0.3;
 /// A wind that is read so near to the one that was flown in is the same, m/s: 1 % of what show drones fly in.
 const READ_WITHIN_MPS: f64 = 0.05;
 
@@ -185,13 +187,15 @@ impl Comparison {
             }
         };
         let mut values = fly(flown_mps)?;
-        // What legs lack of their steady lean depends on the wind that they were flown in.
-        let rounds = if moves && matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
+        // What legs lack of their steady lean depends on the wind that they were flown in, and so does what hovers lack of
+        // it after a climb or a descent at the end of what the vehicle can lean.
+        let rounds = if matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
+        let within_mps = if moves { READ_WITHIN_MPS } else { HOVERS_READ_WITHIN_MPS };
         for _ in 0..rounds {
             let whole = data.keep(|group, bin| values[group][bin].is_some());
             let read = mean_wind(&whole, law, Some((&flat(&values), flown_mps)));
             let read = air(flyable(data, law, read));
-            if (read[0] - flown_mps[0]).hypot(read[1] - flown_mps[1]) < READ_WITHIN_MPS {
+            if (read[0] - flown_mps[0]).hypot(read[1] - flown_mps[1]) < within_mps {
                 break;
             }
             (flown_mps, values) = (read, fly(read)?);

@@ -46,10 +46,19 @@ pub struct Options {
     pub updraft: bool,
     /// Whether the model is flown in each updraft even where no effect and no shape seems to be missing.
     pub each_flown: bool,
-    /// Name of the only effect that may come first; `None`: whatever explains most.
-    pub only: Option<&'static str>,
+    /// The only effect that may come first; `None`: whatever explains most.
+    pub only: Option<Only>,
     /// Whether it is sought what is left at the end.
     pub rest: bool,
+}
+
+/// An effect that alone is searched for at first, in the updraft in which it explains most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Only {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// An updraft to look in beside the usual ones, m/s.
+    pub updraft_mps: f64,
 }
 
 impl Default for Options {
@@ -294,10 +303,15 @@ impl Look {
 impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
-        let look = self.look_in_likelier_updraft()?;
-        let look = if !self.may_differ_in_updraft() {
+        let begins = self.found.steps.is_empty();
+        let asked = self.options.only.filter(|_| begins && self.may_differ_in_updraft());
+        let look = match asked {
+            Some(only) => self.look_where_it_explains_most(only)?,
+            None => self.look_in_likelier_updraft()?,
+        };
+        let look = if asked.is_some() || !self.may_differ_in_updraft() {
             look
-        } else if self.found.steps.is_empty() {
+        } else if begins {
             self.look_in_likeliest_flight(look)?
         } else if self.options.only.is_some() && self.goes_where_it_is_likelier(look.hyper)? {
             self.look(In::Present(None))?
@@ -382,6 +396,37 @@ impl Search<'_> {
         took_up
     }
 
+    /// What is left in the updraft in which one effect explains the flight best: an updraft that was settled in without
+    /// it can have stood for it.
+    fn look_where_it_explains_most(&mut self, only: Only) -> Result<Look, GapError> {
+        let (first, begin) = (self.comparison.clone(), self.found.clone());
+        let bins = first.data.bins_of_groups();
+        let mut best: Option<(f64, Look, Comparison, Found)> = None;
+        let mut starts = [&[0.0, only.updraft_mps], &UPDRAFTS_MPS[..]].concat();
+        starts.dedup();
+        for updraft_mps in starts {
+            (self.comparison, self.found) = (first.clone(), begin.clone());
+            self.found.updraft_mps = updraft_mps;
+            self.found.was_in_updraft = updraft_mps != 0.0;
+            match self.against_model() {
+                Ok(there) if there.data.bins_of_groups() == bins => self.comparison = there,
+                _ => continue,
+            }
+            let look = self.look(In::Present(None))?;
+            let share = updraft_mps / UPDRAFT_DOUBT_MPS;
+            let nats = look.explained().nats - 0.5 * share * share;
+            if best.as_ref().is_none_or(|(most, ..)| nats > *most) {
+                best = Some((nats, look, self.comparison.clone(), self.found.clone()));
+            }
+        }
+        let Some((_, look, comparison, found)) = best else {
+            (self.comparison, self.found) = (first, begin);
+            return self.look(In::Present(None));
+        };
+        (self.comparison, self.found) = (comparison, found);
+        Ok(look)
+    }
+
     /// What is left in the updraft that explains most, or in still air with the effect that explains most: what
     /// a model lacks can look like an updraft, and the other way round.
     fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
@@ -419,10 +464,16 @@ impl Search<'_> {
             return Ok(look);
         }
         let starts = [&[0.0], &UPDRAFTS_MPS[..]].concat();
-        let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper, starts, &FLIGHT_STEPS_MPS)
-        else {
-            return Ok(look);
+        let nearest = self.nearest_flight_mps(&starts);
+        let of = |starts: Vec<f64>, steps: &[f64]| {
+            let mps = self.likeliest_flight_mps(look.hyper, starts, steps)?;
+            Some((self.likely_in(mps, look.hyper)?, mps))
         };
+        // In calm air few hundredths of a metre per second are the likeliest, and steps from afar miss them.
+        let beside = nearest.and_then(|mps| of(vec![mps], &FLIGHT_STEPS_MPS[3..]));
+        let likeliest = of(starts, &FLIGHT_STEPS_MPS).into_iter().chain(beside);
+        let best = likeliest.reduce(|one, other| if other.0 > one.0 { other } else { one });
+        let Some((_, updraft_mps)) = best else { return Ok(look) };
         let is_asked = self.options.most_steps == 0 && self.options.each_flown;
         if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 && !is_asked {
             return Ok(look);
@@ -498,6 +549,26 @@ impl Search<'_> {
         self.found.steps.is_empty() && self.found.felt.is_empty()
     }
 
+    /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
+    fn nearest_flight_mps(&self, starts_mps: &[f64]) -> Option<f64> {
+        let of = |at_mps: &[f64]| -> Option<(f64, f64)> {
+            let bins = self.comparison.data.bins_of_groups();
+            let each = at_mps.par_iter().filter_map(|updraft_mps| {
+                let there = self.flown_in(*updraft_mps).ok()?;
+                let is_alike = there.data.bins_of_groups() == bins;
+                let gap_us = there.raw_gap_us().ok().filter(|_| is_alike)?;
+                Some((gap_us, *updraft_mps))
+            });
+            each.reduce_with(|one, other| if other.0 < one.0 { other } else { one })
+        };
+        let mut best = of(starts_mps)?;
+        for step_mps in &FLIGHT_STEPS_MPS[..4] {
+            let beside = of(&[best.1 - step_mps, best.1 + step_mps]);
+            best = beside.filter(|beside| beside.0 < best.0).unwrap_or(best);
+        }
+        Some(best.1)
+    }
+
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
     fn likely_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
         let fit = || self.fitted_in(updraft_mps, hyper);
@@ -563,7 +634,7 @@ impl Search<'_> {
         let updraft = if may_differ { Updraft::MayDiffer } else { Updraft::Same };
         let mut candidates = library(&found.vehicle, comparison, updraft)?;
         let only = self.options.only.filter(|_| found.steps.is_empty());
-        let is_asked = only.is_some_and(|name| Role::MomentumDrag.is_of(name));
+        let is_asked = only.is_some_and(|only| Role::MomentumDrag.is_of(only.effect));
         candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag, is_asked)?);
         if !comparison.is_in_other_wind() {
             candidates.extend(read_otherwise(comparison, &found.vehicle, updraft)?);
@@ -572,7 +643,7 @@ impl Search<'_> {
         candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
         let mut generics = all(&comparison.scene, &comparison.headings());
         if let Some(only) = only {
-            candidates.retain(|candidate| candidate.name == only);
+            candidates.retain(|candidate| candidate.name == only.effect);
             generics.clear();
         }
         let drones = comparison.data.counts();

@@ -10,7 +10,7 @@ use super::contest::PRODUCT_NATS;
 use super::decide::{CLASS_NATS, margin_nats};
 use super::dependence::depends_on_no_more;
 use super::error::GapError;
-use super::explain::{Found, Options};
+use super::explain::{Found, Only, Options};
 use super::verdict::{Finding, Step};
 use crate::effects::{Role, find};
 
@@ -25,7 +25,7 @@ struct Ended {
     found: Found,
     nats: f64,
     /// The effect that alone was searched for, if it was one.
-    only: Option<&'static str>,
+    only: Option<Only>,
 }
 
 /// What is to be told: a search that ended, and the names of its finding if that is the only one.
@@ -55,11 +55,15 @@ pub(super) fn fewer_instead(
     };
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let alone = rivals(&found.steps);
-    let by = |name: &'static str| {
-        let only = Some(name);
-        Options { only, most_steps: 1, replicates: 0, rest: false, ..*options }
+    let updraft_mps = found.updraft_mps;
+    let by = |only: Only| Options {
+        only: Some(only),
+        most_steps: 1,
+        replicates: 0,
+        rest: false,
+        ..*options
     };
-    let alone = alone.into_iter().map(by);
+    let alone = alone.into_iter().map(|effect| by(Only { effect, updraft_mps }));
     let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
@@ -67,7 +71,7 @@ pub(super) fn fewer_instead(
     let Decided { ended, names } = decided(Ended { found, nats, only: None }, others);
     let mut found = match ended.only {
         // What is left beside it is sought only now.
-        Some(name) => flown(&Options { rest: true, ..by(name) })?,
+        Some(only) => flown(&Options { rest: true, ..by(only) })?,
         None => ended.found,
     };
     if let [step] = &mut found.steps[..] {
@@ -86,10 +90,9 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
     let lead = lead.map(|effect| effect.definition().name);
     let mut all: Vec<(f64, &'static str)> = Vec::new();
     for step in steps {
-        let most = step.rivals.iter().map(|rival| rival.gain_nats).fold(step.gain_nats, f64::max);
-        let much =
-            step.rivals.iter().filter(|rival| !rival.generic && rival.gain_nats > SHARE * most);
-        for rival in much {
+        let effects = || step.rivals.iter().filter(|rival| !rival.generic);
+        let most = effects().map(|rival| rival.gain_nats).fold(0.0, f64::max);
+        for rival in effects().filter(|rival| rival.gain_nats > SHARE * most) {
             let Some(effect) = find(&rival.name) else { continue };
             all.push((rival.gain_nats, effect.definition().name));
         }

@@ -60,7 +60,7 @@ pub use data::{Data, Flown};
 pub use dependence::Dependence;
 pub use difficulty::{SteadyPulse, There, fisher_z};
 pub use error::GapError;
-pub use explain::{Found, Options};
+pub use explain::{Found, Only, Options};
 pub use left_out::LeftOut;
 pub use make::{Explained, Input, explain};
 pub use map_gain::{Measured, map_gain};
