@@ -93,12 +93,28 @@ const FORM_US: f64 = 0.6;
 const FORM_ORDERS: RangeInclusive<usize> = 2..=4;
 /// Curves over the horizontal air speed.
 const FORM_WIND_ORDERS: RangeInclusive<usize> = 1..=2;
+/// As [`FORM_US`], over the horizontal air speed of legs: into a wind of 5 m/s they fly twice as fast as the ladder, and
+/// the two models differ by 2 to 3 us there (docs/blind.md).
+const FORM_WIND_US: f64 = 1.5;
+/// As [`FORM_US`], over the climb of a flight that has legs: a model that is fitted to both fits the climb less well.
+const FORM_WITH_LEGS_US: f64 = 1.0;
 
 /// Shapes by which a flight may differ from any model of its kind, as regressors of one standard deviation each.
 pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
     let wind = Along { of: |signals| signals.horizontal_mps, least_span: 1.5 };
-    let of_wind = wind.shapes(scene, FORM_WIND_ORDERS, FORM_US);
-    [CLIMB.shapes(scene, FORM_ORDERS, FORM_US), of_wind].concat()
+    let of_wind = wind.shapes(scene, FORM_WIND_ORDERS, 1.0);
+    if of_wind.is_empty() {
+        return CLIMB.shapes(scene, FORM_ORDERS, FORM_US);
+    }
+    // How climb acts changes with the wind.
+    let mut of_both = Vec::new();
+    for climb in CLIMB.shapes(scene, FORM_WIND_ORDERS, FORM_US) {
+        let by = |wind: &Column| wind.each(|g, d, b| wind.at(g, d, b) * climb.at(g, d, b));
+        of_both.extend(of_wind.iter().map(by));
+    }
+    let of_wind = wind.shapes(scene, FORM_WIND_ORDERS, FORM_WIND_US).into_iter();
+    let of_climb = CLIMB.shapes(scene, FORM_ORDERS, FORM_WITH_LEGS_US).into_iter();
+    of_climb.chain(of_wind).chain(of_both).collect()
 }
 
 /// Chebyshev polynomials over the climb; none where a flight spans too little of it.

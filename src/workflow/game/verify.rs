@@ -50,7 +50,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// What is wrong with it, in a sentence; some problems name the file themselves.
+    /// The problem of a file that was altered, in a sentence that names the file once; `None`: nothing is wrong.
     pub fn wrong(&self) -> Option<String> {
         let problem = self.problem.as_ref()?;
         let is_told = problem.contains(&self.file);

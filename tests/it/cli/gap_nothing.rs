@@ -52,6 +52,7 @@ fn nothing_is_found_where_nothing_is_hidden() {
     let flights = [
         ("airsim-generic-quad", "calibration", 3, 2),
         ("arducopter-sitl", "calibration", 8, -2),
+        ("arducopter-sitl", "calibration", 8, 2),
         ("pixel", "calibration", 0, -2),
         ("phantom4", "calibration-counterphase", 5, 1),
     ];
