@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::workflow::game::verify::{self, Check, Verification};
+use crate::workflow::game::verify::{self, Verification};
 
 /// Digits of a SHA-256.
 const DIGITS: usize = 64;
@@ -45,7 +45,7 @@ pub(super) fn run(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandE
     }
     // What is not on standard output goes to the other.
     if context.quiet || context.json {
-        for wrong in verified.checks.iter().filter_map(Check::wrong) {
+        for wrong in verified.checks.iter().filter_map(|check| check.wrong(": ")) {
             context.warn(&wrong);
         }
     }
@@ -55,7 +55,7 @@ pub(super) fn run(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandE
 fn text(verified: &Verification) -> String {
     let mut text = String::new();
     for check in &verified.checks {
-        let _ = match check.wrong() {
+        let _ = match check.wrong(": ") {
             None => writeln!(text, "ok     {}  {}", check.file, check.holds),
             Some(wrong) => writeln!(text, "WRONG  {wrong}"),
         };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::verify::{self, Check};
+use super::verify;
 use super::{files, game_path, read_game, record_path};
 use crate::base::digest::sha256;
 use crate::base::file::{read_whole, write_whole};
@@ -106,7 +106,7 @@ fn opened_before(path: &Path, verdict_sha256: &str) -> Result<BlindRecord, Workf
 /// Refuses a game of which something was altered after its seal was opened: its record proves nothing.
 fn still_whole(folder: &Path) -> Result<(), WorkflowError> {
     let verified = verify::run(folder, None)?;
-    match verified.checks.iter().find_map(Check::wrong) {
+    match verified.checks.iter().find_map(|check| check.wrong(" ")) {
         Some(altered) => Err(WorkflowError::Usage(format!(
             "{altered}; the seal was opened before, but what lies here is not what it was opened for"
         ))),

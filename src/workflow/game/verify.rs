@@ -50,11 +50,12 @@ pub struct Check {
 }
 
 impl Check {
-    /// The problem of a file that was altered, in a sentence that names the file once; `None`: nothing is wrong.
-    pub fn wrong(&self) -> Option<String> {
+    /// The problem of a file that was altered, in a sentence that names the file once, with what stands between the
+    /// two; `None`: nothing is wrong.
+    pub fn wrong(&self, between: &str) -> Option<String> {
         let problem = self.problem.as_ref()?;
         let is_told = problem.contains(&self.file);
-        Some(if is_told { problem.clone() } else { format!("{} {problem}", self.file) })
+        Some(if is_told { problem.clone() } else { format!("{}{between}{problem}", self.file) })
     }
 }
 
