@@ -87,7 +87,7 @@ pub(super) fn signals_of(effect: &str) -> &'static [Signal] {
     find(effect).map_or(&[], |effect| effect.definition().signals)
 }
 
-/// The model's increments are those of climb.
+/// The signal that an effect feels by one of its own: the model's increments are those of climb.
 fn felt_as(signal: Signal) -> Signal {
     if signal == Signal::ModelIncrement { Signal::Climb } else { signal }
 }

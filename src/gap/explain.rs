@@ -48,7 +48,7 @@ pub struct Options {
     pub each_flown: bool,
     /// The only effect that may come first; `None`: whatever explains most.
     pub only: Option<Only>,
-    /// Whether it is sought what is left at the end.
+    /// Whether to look, after the last finding, for what is left.
     pub rest: bool,
 }
 
@@ -465,13 +465,10 @@ impl Search<'_> {
         }
         let starts = [&[0.0], &UPDRAFTS_MPS[..]].concat();
         let nearest = self.nearest_flight_mps(&starts);
-        let of = |starts: Vec<f64>, steps: &[f64]| {
-            let mps = self.likeliest_flight_mps(look.hyper, starts, steps)?;
-            Some((self.likely_in(mps, look.hyper)?, mps))
-        };
+        let of = |starts: &[f64], steps: &[f64]| self.likeliest_flight(look.hyper, starts, steps);
         // In calm air few hundredths of a metre per second are the likeliest, and steps from afar miss them.
-        let beside = nearest.and_then(|mps| of(vec![mps], &FLIGHT_STEPS_MPS[3..]));
-        let likeliest = of(starts, &FLIGHT_STEPS_MPS).into_iter().chain(beside);
+        let beside = nearest.and_then(|mps| of(&[mps], &FLIGHT_STEPS_MPS[3..]));
+        let likeliest = of(&starts, &FLIGHT_STEPS_MPS).into_iter().chain(beside);
         let best = likeliest.reduce(|one, other| if other.0 > one.0 { other } else { one });
         let Some((_, updraft_mps)) = best else { return Ok(look) };
         let is_asked = self.options.most_steps == 0 && self.options.each_flown;
@@ -498,8 +495,8 @@ impl Search<'_> {
     fn goes_where_it_is_likelier(&mut self, hyper: Hyper) -> Result<bool, GapError> {
         let (mut went, mut hyper) = (false, hyper);
         for steps_mps in [&FLIGHT_STEPS_MPS[..], &FLIGHT_STEPS_MPS[2..]] {
-            let start = vec![self.found.updraft_mps];
-            let Some(updraft_mps) = self.likeliest_flight_mps(hyper, start, steps_mps) else {
+            let start = [self.found.updraft_mps];
+            let Some((_, updraft_mps)) = self.likeliest_flight(hyper, &start, steps_mps) else {
                 break;
             };
             if updraft_mps == self.found.updraft_mps {
@@ -522,51 +519,31 @@ impl Search<'_> {
         Ok(went)
     }
 
-    /// The updraft in which the flight of the present model is likeliest, m/s, from the best of some starts by steps to
-    /// either side; `None`: it can fly in none.
-    fn likeliest_flight_mps(
+    /// How likely the flight of the present model is in the updraft in which it is likeliest, nats, and that updraft, m/s,
+    /// from the best of some starts by steps to either side; `None`: it can fly in none.
+    fn likeliest_flight(
         &self,
         hyper: Hyper,
-        starts_mps: Vec<f64>,
+        starts_mps: &[f64],
         steps_mps: &[f64],
-    ) -> Option<f64> {
-        let of = |at_mps: Vec<f64>| -> Option<(f64, f64)> {
-            let each = at_mps
-                .into_par_iter()
-                .filter_map(|updraft_mps| Some((self.likely_in(updraft_mps, hyper)?, updraft_mps)));
-            each.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+    ) -> Option<(f64, f64)> {
+        most_beside(|updraft_mps| self.likely_in(updraft_mps, hyper), starts_mps, steps_mps)
+    }
+
+    /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
+    fn nearest_flight_mps(&self, starts_mps: &[f64]) -> Option<f64> {
+        let bins = self.comparison.data.bins_of_groups();
+        let nearness = |updraft_mps: f64| {
+            let there = self.flown_in(updraft_mps).ok()?;
+            let is_alike = there.data.bins_of_groups() == bins;
+            there.raw_gap_us().ok().filter(|_| is_alike).map(|gap_us| -gap_us)
         };
-        let mut best = of(starts_mps)?;
-        for step_mps in steps_mps {
-            let beside = of(vec![best.1 - step_mps, best.1 + step_mps]);
-            best = beside.filter(|beside| beside.0 > best.0).unwrap_or(best);
-        }
-        Some(best.1)
+        Some(most_beside(nearness, starts_mps, &FLIGHT_STEPS_MPS[..4])?.1)
     }
 
     /// Whether the present model is the one that the search began with.
     fn has_model(&self) -> bool {
         self.found.steps.is_empty() && self.found.felt.is_empty()
-    }
-
-    /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
-    fn nearest_flight_mps(&self, starts_mps: &[f64]) -> Option<f64> {
-        let of = |at_mps: &[f64]| -> Option<(f64, f64)> {
-            let bins = self.comparison.data.bins_of_groups();
-            let each = at_mps.par_iter().filter_map(|updraft_mps| {
-                let there = self.flown_in(*updraft_mps).ok()?;
-                let is_alike = there.data.bins_of_groups() == bins;
-                let gap_us = there.raw_gap_us().ok().filter(|_| is_alike)?;
-                Some((gap_us, *updraft_mps))
-            });
-            each.reduce_with(|one, other| if other.0 < one.0 { other } else { one })
-        };
-        let mut best = of(starts_mps)?;
-        for step_mps in &FLIGHT_STEPS_MPS[..4] {
-            let beside = of(&[best.1 - step_mps, best.1 + step_mps]);
-            best = beside.filter(|beside| beside.0 < best.0).unwrap_or(best);
-        }
-        Some(best.1)
     }
 
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
@@ -864,6 +841,24 @@ impl Search<'_> {
             if self.has_model() { self.flights.flown(near, updraft_mps, fly)? } else { fly()? };
         Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
+}
+
+/// The most that something is, and where: from the best of some starts by steps to either side; `None`: it is nowhere.
+fn most_beside(
+    of: impl Fn(f64) -> Option<f64> + Sync,
+    starts: &[f64],
+    steps: &[f64],
+) -> Option<(f64, f64)> {
+    let best_of = |places: &[f64]| {
+        let each = places.par_iter().filter_map(|place| Some((of(*place)?, *place)));
+        each.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+    };
+    let mut best = best_of(starts)?;
+    for step in steps {
+        let beside = best_of(&[best.1 - step, best.1 + step]);
+        best = beside.filter(|beside| beside.0 > best.0).unwrap_or(best);
+    }
+    Some(best)
 }
 
 /// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the
@@ -1203,6 +1198,16 @@ pub(super) const MOST_GUSTS_MPS: f64 = 1.5;
 mod tests {
     use super::super::trial;
     use super::*;
+
+    #[test]
+    fn the_most_is_climbed_to_from_the_best_of_the_starts() {
+        let hill = |place: f64| (place > -2.0).then_some(-(place - 1.3).abs());
+        let near =
+            |starts: &[f64]| most_beside(hill, starts, &[0.5, 0.25, 0.12]).map(|best| best.1);
+        assert_eq!(near(&[0.0, -1.0, 1.0]), Some(1.25));
+        assert_eq!(near(&[-1.5]), Some(-1.5 + 0.5 + 0.25 + 0.12));
+        assert_eq!(near(&[-3.0]), None);
+    }
 
     #[test]
     fn a_model_that_is_flown_again_still_doubts_the_mean_of_few_drones() {

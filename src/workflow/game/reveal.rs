@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::verify;
-use super::{files, game_path, read_game, record_path};
+use super::{files, game_path, read_game, record_path, verify};
 use crate::base::digest::sha256;
 use crate::base::file::{read_whole, write_whole};
 use crate::base::plain::Shown as _;
