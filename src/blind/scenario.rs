@@ -321,6 +321,11 @@ impl Scenario {
         Ok(Self { schema, seed, cell, hidden, nuisance, world: Some(world), left_over_us })
     }
 
+    /// The vertical air speed that the whole flight is in, m/s, up positive.
+    pub fn updraft_mps(&self) -> f64 {
+        self.world.as_ref().map_or(self.nuisance.air.updraft_mps, |world| world.air.updraft_mps)
+    }
+
     /// Number of slots in the formation.
     pub fn slots(&self) -> u16 {
         self.cell.slots()

@@ -142,6 +142,9 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
             }
         }
     }
+    if outcome.hidden.is_empty() && outcome.found.is_empty() && verdict.is_unexplained() {
+        outcome.found.push("something that is not named".to_owned());
+    }
     if let Some(shrink) = &verdict.gap.drones {
         let (before, after) = (shrink.before_us.value, shrink.after_us.value);
         outcome.raw_shrink = (before > 0.0).then(|| 1.0 - after / before);

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::hide::{KINDS, ON_REQUEST};
 use super::play::Played;
 use super::score::{Called, HiddenOutcome, Outcome};
 use crate::effects::{Role, find};
@@ -67,7 +68,7 @@ pub fn is_right(outcome: &Outcome) -> bool {
     let others = outcome.wrong_names.len() - outcome.wrong_in_class
         + outcome.wrong_classes
         + outcome.wrong_unknowns;
-    outcome.hidden.iter().all(called) && others == 0
+    outcome.hidden.iter().all(called) && others == 0 && !outcome.is_false_alarm()
 }
 
 /// Comparison of verdict and truth, one sentence or two for each effect.
@@ -77,6 +78,8 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
     if outcome.hidden.is_empty() {
         words.push(if outcome.found.is_empty() {
             "Right: nothing was hidden, and nothing was named.".to_owned()
+        } else if verdict.is_unexplained() && !verdict.sensor.named {
+            "Wrong: nothing was hidden, and the verdict says that something is missing.".to_owned()
         } else {
             format!("Wrong: nothing was hidden, and {} was named.", outcome.found.join(" and "))
         });
@@ -131,13 +134,22 @@ fn no_shrink(verdict: &Verdict) -> Option<String> {
     })
 }
 
+/// The unit of a hidden effect's size, after a space; empty: it has none.
+fn unit(one: &HiddenOutcome) -> String {
+    let kind = KINDS.iter().chain(ON_REQUEST).find(|kind| kind.name == one.kind);
+    let (Some(effect), Some(kind)) = (find(&one.effect), kind) else { return String::new() };
+    let size = effect.definition().parameters.iter().find(|parameter| parameter.name == kind.size);
+    size.filter(|size| !size.unit.is_empty())
+        .map_or_else(String::new, |size| format!(" {}", size.unit))
+}
+
 fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
     let of_all = if Role::WarmUpTime.is_of(&one.effect) && one.value != 0.0 {
         " in the fleet's mean (motors that were warm at take-off drift no more)"
     } else {
         ""
     };
-    let what = format!("{} was hidden, at {}{of_all}", one.effect, short(one.value));
+    let what = format!("{} was hidden, at {}{}{of_all}", one.effect, short(one.value), unit(one));
     let sizes = match (one.fitted, one.covered, one.relative_error) {
         (Some(fitted), covered, error) => {
             let off = error.map_or_else(String::new, |error| {
@@ -191,7 +203,9 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
                 _ => "",
             };
             let z = one.z.map_or_else(String::new, |z| format!(" (z {z:.1})"));
-            let found = if outcome.found.is_empty() {
+            let found = if outcome.found.is_empty() && verdict.is_unexplained() {
+                "says only that something is missing".to_owned()
+            } else if outcome.found.is_empty() {
                 "names nothing".to_owned()
             } else {
                 format!("names {}", outcome.found.join(" and "))

@@ -27,17 +27,22 @@ pub enum There<'a> {
 }
 
 /// Fisher z of what is known to be there: its size over its error, with the air, offsets and everything
-/// else that is there free. `input.vehicle` is the true one. `None`: the pulse of steady flight does not
-/// show it.
+/// else that is there free. `input.vehicle` is the true one, `updraft_mps` what the whole flight was in: a fast
+/// descent in air that sinks as fast is none for the rotors. `None`: the pulse of steady flight does not show it.
 ///
 /// # Errors
 /// See [`GapError`].
-pub fn fisher_z(input: &Input<'_>, there: &[There<'_>]) -> Result<Vec<Option<f64>>, GapError> {
+pub fn fisher_z(
+    input: &Input<'_>,
+    updraft_mps: f64,
+    there: &[There<'_>],
+) -> Result<Vec<Option<f64>>, GapError> {
     let plan = input.plan.ok_or(GapError::NoSimulatedSide)?;
     let exponent = thrust_exponent(input.vehicle);
     let (data, _) = Data::of_plan(plan, input.flown, exponent).split();
     let simulated = Simulated::Refly(plan);
-    let comparison = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
+    let comparison =
+        Comparison::of(&data, input.vehicle, &simulated, input.plan, updraft_mps, None)?;
     let parameter = |one: &There<'_>| match one {
         There::Effect { effect, size, .. } => size_of(effect, size),
         There::Pulse(_) => None,

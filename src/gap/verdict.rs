@@ -59,6 +59,13 @@ impl Verdict {
     pub fn has_resting_voltage(&self) -> bool {
         !self.cautions.iter().any(|caution| matches!(caution, Warning::NoRestingVoltage))
     }
+
+    /// Whether it names nothing and says that something is missing: more is left on held-out rungs than noise and
+    /// air leave, in a wind that cannot be the cause.
+    pub fn is_unexplained(&self) -> bool {
+        let is_strong = is_strong_wind(self.wind.mean_mps);
+        self.steps.is_empty() && self.gap.left_over().is_some() && !is_strong
+    }
 }
 
 /// What went into a verdict.

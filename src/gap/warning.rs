@@ -115,10 +115,10 @@ impl fmt::Display for Warning {
                 )?;
                 f.write_str(if *in_strong_wind {
                     "in so strong a wind that may be how the drones lean, an updraft, or something that \
-                     nothing in the library explains"
+                     this comparison cannot name"
                 } else {
-                    "something is missing that nothing in the library explains, and names and sizes may \
-                     stand for it"
+                    "something is missing that this comparison cannot name, and names and sizes may stand \
+                     for it"
                 })
             }
             Self::Tables => f.write_str(
@@ -217,7 +217,7 @@ mod tests {
         assert!(in_storm.ends_with("may be how the drones lean, or an updraft."), "{in_storm}");
         assert_eq!(
             summary(9.0, 2.25),
-            "Something is missing that nothing in the library explains. On rungs that were held out 9.0 us \
+            "Something is missing, and this comparison cannot say what. On rungs that were held out 9.0 us \
              are left; noise and air alone would leave 6.0."
         );
         assert!(summary(6.4, 2.25).starts_with("Nothing is missing"), "nobody would miss it");

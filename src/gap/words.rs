@@ -96,11 +96,8 @@ fn velocity_error(verdict: &Verdict) -> String {
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
-    let mut text = if verdict.steps.is_empty()
-        && verdict.gap.left_over().is_some()
-        && !is_strong_wind
-    {
-        "Something is missing that nothing in the library explains.".to_owned()
+    let mut text = if verdict.is_unexplained() {
+        "Something is missing, and this comparison cannot say what.".to_owned()
     } else if verdict.steps.is_empty() {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
         format!(

@@ -69,6 +69,8 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
     ));
     if flown.logs == 0 {
         play::remove(folder)?;
+        // Only where nothing else lies in it.
+        let _ = std::fs::remove_dir(folder);
         return Err(WorkflowError::Nothing(format!(
             "no drone can fly this: {vehicle}, {} in {} air, {:+.1} m/s of updraft{}; the folder holds no game",
             game.protocol.template(),

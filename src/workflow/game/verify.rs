@@ -13,6 +13,7 @@ use crate::base::plain::Shown as _;
 use crate::blind::game::GameFile;
 use crate::blind::record::BlindRecord;
 use crate::blind::seal;
+use crate::campaign::CampaignError;
 use crate::gap::Verdict;
 use crate::workflow::error::{WorkflowError, with_reasons};
 use crate::workflow::gap::{VERDICT, proof};
@@ -73,12 +74,18 @@ impl Checks<'_> {
 }
 
 /// Verifies a game, before its seal is opened or after. `published` is the truth's SHA-256 as somebody has
-/// written it down; `None`: as the record has it, else `game.json`.
+/// written it down; `None`: as the record has it, else `game.json`, else `sealed/SHA256`.
 ///
 /// # Errors
 /// When there is no game. What was altered is no error, but in [`Verification::checks`].
 pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, WorkflowError> {
-    let game = read_game(folder)?;
+    let (game, damage) = match read_game(folder) {
+        Ok(game) => (Some(game), None),
+        Err(
+            error @ (WorkflowError::Campaign(CampaignError::Json { .. }) | WorkflowError::Blind(_)),
+        ) => (None, Some(with_reasons(&error))),
+        Err(error) => return Err(error),
+    };
     let path = record_path(folder);
     let revealed = path.exists();
     let record = revealed.then(|| read_record(&path));
@@ -89,11 +96,18 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
     };
     let recorded = record.as_ref().map(|record| record.truth_sha256.clone());
     let published = published.map(str::to_lowercase);
-    let truth_sha256 = published.or(recorded).unwrap_or_else(|| game.truth_sha256.clone());
+    let given = || game.as_ref().map(|game| game.truth_sha256.clone());
+    let beside = || seal::published(folder).unwrap_or_default();
+    let truth_sha256 = published.or(recorded).or_else(given).unwrap_or_else(beside);
     let mut checks = Checks { folder, made: Vec::new() };
     checks.seal(&truth_sha256);
-    checks.game(&game, record.as_ref(), &truth_sha256);
-    checks.flight(&game);
+    if let Some(game) = &game {
+        checks.game(game, record.as_ref(), &truth_sha256);
+        checks.flight(game);
+    }
+    if let Some(problem) = damage {
+        checks.add(&game_path(folder), "", Some(problem));
+    }
     let proven = checks.verdict(record.as_ref(), revealed);
     if let Some(problem) = unreadable {
         checks.add(&path, "", Some(problem));

@@ -67,6 +67,6 @@ impl Explain for Searched {
             left_out: Vec::new(),
         };
         let hidden = there(truth, &vehicle);
-        fisher_z(&input, &hidden).unwrap_or_else(|_| unknown())
+        fisher_z(&input, truth.updraft_mps(), &hidden).unwrap_or_else(|_| unknown())
     }
 }

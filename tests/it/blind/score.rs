@@ -11,6 +11,7 @@ use updraft::blind::score::{Called, Outcome, score};
 use updraft::blind::seal;
 use updraft::blind::series::{FIRST_SCORING_SEED, Place, Settings, run};
 use updraft::blind::table::table;
+use updraft::blind::told::{is_right, words};
 use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario, Worlds};
 use updraft::gap::verdict::{
     Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
@@ -127,6 +128,21 @@ fn silence_and_false_alarms() {
     for finding in [plain("battery"), class(&["battery", "motor-thermal"]), unknown("time")] {
         assert!(scored(&[], vec![finding]).is_false_alarm());
     }
+    let mut unexplained = verdict(Vec::new());
+    let left =
+        Shrink { after_without_air_us: 9.0, floor_us: 6.0, chi2: (2.5, 2.5), ..Shrink::default() };
+    unexplained.gap.rungs = Some(left);
+    let says = |hidden: &[&str]| {
+        let outcome = score(&truth(Base::Airsim, hidden), &unexplained, &[]);
+        (outcome.is_false_alarm(), is_right(&outcome), words(&outcome, &unexplained).join(" "))
+    };
+    let (is_false, is_right, words) = says(&[]);
+    assert!(is_false && !is_right && words.ends_with("says that something is missing."), "{words}");
+    let (is_false, _, words) = says(&["parasitic-drag"]);
+    assert!(
+        !is_false && words.contains(" m², and the verdict says only that something"),
+        "{words}"
+    );
     let mut sensor = verdict(Vec::new());
     sensor.sensor.named = true;
     assert!(score(&truth(Base::Airsim, &[]), &sensor, &[]).is_false_alarm());

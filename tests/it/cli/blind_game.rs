@@ -106,6 +106,8 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
         ("sealed/truth.json", "\"nonce\": \"", "\"nonce\": \"0", "truth.json: was altered"),
         ("sealed/SHA256", &sha256[..8], "01234567", "SHA256: says 01234567"),
         ("game.json", "still", "calm", "game.json: was altered: its SHA-256 is"),
+        ("game.json", "\"still\"", "", "game.json"),
+        ("game.json", "blind-game/1", "blind-game/9", "updraft.blind-game/9"),
         ("game.json", &sha256[..8], "01234567", "game.json: says that the truth's SHA-256 is 0123"),
         ("gap/verdict.json", "battery", "buttery", "verdict.json: was altered: its SHA-256 is"),
         ("gap/SHA256", "verdict", "verdikt", "verdict.json was edited after"),
@@ -213,12 +215,28 @@ fn what_cannot_be_hidden_is_said() {
         assert!(ended.err.contains("nowhere"), "{ended}");
     }
     says(5, &["-o", "storm", "--updraft", "20", "--grid", "2x2"], "no drone can fly");
-    assert!(!bench.path("storm/game.json").exists());
+    assert!(!bench.path("storm").exists());
     let ended = bench.expect(2, &["blind", "verify", "campaign", "--sha256", "12"]);
     assert!(ended.err.contains("64 hexadecimal digits"), "{ended}");
     // A series without a seed is refused as it was.
     let ended = bench.expect(2, &["blind"]);
     assert!(ended.err.contains("--seed <SEED>"), "{ended}");
+}
+
+/// What descends no faster than the air sinks has no wake of its own to fly into.
+#[test]
+fn how_hard_it_was_to_see_is_told_of_the_air_that_was_flown_in() {
+    let bench = Bench::new();
+    let vehicle = ["--vehicle", "phantom4", "--effect", "vortex-ring=0.1", "--seed", "7"];
+    let [in_still_air, in_sinking_air] =
+        [("0", "still"), ("-2", "sinking")].map(|(updraft, folder)| {
+            let air = ["--updraft", updraft, "--wind", "3", "-o", folder];
+            hide(&bench, &[&FEW[..], &vehicle, &air].concat());
+            compare(&bench, &format!("{folder}/gap"), &naming("battery", "exponent", 0.72));
+            let ended = bench.expect(0, &["blind", "reveal", folder, "--json"]);
+            ended.json("updraft.blind-record/1")["outcome"]["hidden"][0]["z"].as_f64().unwrap()
+        });
+    assert!(in_still_air > 6.0 && in_sinking_air < 2.0, "{in_still_air} {in_sinking_air}");
 }
 
 /// The whole way, with the real search, which finds no truth: it was carried off.
