@@ -215,7 +215,7 @@ pub(super) fn search(
     let mut found = search.found;
     told_once(&mut found.steps);
     settle(&mut found);
-    single::review(&mut found);
+    single::review(&mut found)?;
     Ok(found)
 }
 

@@ -1,13 +1,20 @@
 //! Names that do not stand alone: an effect is named alone only where nothing else may be meant. What is in doubt
 //! becomes a class with what it may be instead.
 
+use std::ops::RangeInclusive;
+
+use super::candidates::set;
+use super::contest::PRODUCT_NATS;
 use super::decide::{CONTEST_MARGINS, margin_nats};
 use super::dependence::{Dependence, depend_on_the_same, signals_of};
+use super::error::GapError;
 use super::explain::Found;
-use super::refine::{Parameter, half_interval};
+use super::generic::climb_shapes;
+use super::gls::{Problem, Split};
+use super::refine::{self, Parameter, half_interval};
 use super::search::FREE_FLOOR_NATS;
 use super::verdict::{Finding, Rest, Rival, Step};
-use crate::effects::Role;
+use crate::effects::{Role, Signal};
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
 const AT_BOUND: f64 = 1e-3;
@@ -20,12 +27,54 @@ const SMALL: f64 = 0.2;
 /// Share of a name's gain that a rival must have to stand for it. Chosen.
 const RIVAL_SHARE: f64 = 0.25;
 
+/// Shapes of the climb that a flight whose response changes with time must be told from: as many as an unknown that
+/// depends on climb may have.
+const CLIMB_ORDERS: RangeInclusive<usize> = 1..=5;
+
 /// Makes classes of the names in doubt at the end of a search.
-pub(super) fn review(found: &mut Found) {
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     at_their_bounds(found);
+    beside_a_curve(found)?;
     beside_something_unknown(&mut found.steps);
     beside_something_larger(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
+    Ok(())
+}
+
+/// Names of what changes the response with time, where a curve of the climb does as well: on a ladder that flies each
+/// speed once, time and speed go together.
+fn beside_a_curve(found: &mut Found) -> Result<(), GapError> {
+    for place in 0..found.steps.len() {
+        let Some(effect) = new_name(&found.steps[place]) else { continue };
+        let signals = signals_of(effect);
+        let is_product = [Signal::Climb, Signal::Time].iter().all(|one| signals.contains(one));
+        let own = found.parameters.iter().position(|parameter| parameter.effect == effect);
+        let Some(own) = own.filter(|_| is_product) else { continue };
+        let [nats, curve_nats] = gains(found, own)?;
+        let is_curve = nats < curve_nats + PRODUCT_NATS;
+        doubt(&mut found.steps[place], is_curve.then(|| Dependence::Climb.name().to_owned()));
+    }
+    Ok(())
+}
+
+/// What a size explains, nats, and what curves of the climb would explain in its place.
+fn gains(found: &Found, size: usize) -> Result<[f64; 2], GapError> {
+    let Found { comparison, parameters, gusts_mps, .. } = found;
+    let Parameter { effect, name, before, .. } = parameters[size];
+    let mut without = found.vehicle.clone();
+    set(&mut without, effect, name, before.unwrap_or_default());
+    let patterns = comparison.patterns(&found.vehicle, *gusts_mps)?;
+    let residual = Split::of(&comparison.residual(&without, *gusts_mps)?);
+    let doubts = refine::doubts(comparison, &found.vehicle, parameters)?;
+    let mut sizes = refine::slopes(comparison, &found.vehicle, parameters)?;
+    let own = sizes.remove(size);
+    let curves = climb_shapes(&comparison.scene, CLIMB_ORDERS);
+    let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
+    let solution = problem.with(&sizes).at(&found.hyper);
+    Ok([solution.gain(&own).nats, solution.gain_of_all(&curves).1])
 }
 
 /// An effect that is named alone, and was not in the model.
@@ -161,6 +210,7 @@ pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>
 
 #[cfg(test)]
 mod tests {
+    use super::super::data::Group;
     use super::super::trial::{self, name};
     use super::*;
     use crate::gap::refine::size_of;
@@ -195,6 +245,29 @@ mod tests {
         assert_eq!(of(1.0, 0.05), "thrust-curve battery", "the end of its range");
         assert_eq!(of(0.5, 0.4), "thrust-curve battery", "it may be none");
         assert_eq!(of_gain(37.0, 1.0, 0.05), "thrust-curve", "no rival is near");
+    }
+
+    #[test]
+    fn what_changes_with_time_is_told_from_a_curve_by_speeds_that_are_flown_again() {
+        let of = |is_flown_again: bool| {
+            let mut data = trial::data(3, |_, _| 0.0);
+            let Group { bins, measured, .. } = &mut data.groups[0];
+            for bin in bins.iter_mut().filter(|bin| is_flown_again && bin.segment > 3) {
+                bin.velocity_mps[2] /= bin.climb_mps().abs();
+            }
+            for (one, bin) in measured.iter_mut().flat_map(|values| values.iter_mut().zip(&*bins)) {
+                one.climb_mps = bin.climb_mps();
+                one.pulse_us += bin.climb_mps() * bin.middle_s();
+            }
+            let mut found = Found::nothing(trial::comparison(&data));
+            found.steps = vec![step(name("response-drift"), 35.0, 9.0, &[])];
+            found.parameters = size_of("response-drift", "slope_us").into_iter().collect();
+            found.values = vec![(300.0, 1.0)];
+            beside_a_curve(&mut found).unwrap();
+            told(&found.steps).remove(0)
+        };
+        assert_eq!(of(false), "response-drift climb");
+        assert_eq!(of(true), "response-drift");
     }
 
     #[test]

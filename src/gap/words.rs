@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::decide::PRODUCT;
+use super::dependence::Dependence;
 use super::verdict::{Finding, Fitted, Step, Verdict, is_strong_wind};
 use crate::effects::Role;
 
@@ -38,6 +39,7 @@ pub fn member(name: &str) -> &str {
         name if name == PRODUCT.name() => {
             "something unknown that depends on climb speed times time"
         }
+        name if name == Dependence::Climb.name() => "something unknown that depends on climb speed",
         effect => effect,
     }
 }
