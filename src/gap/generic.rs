@@ -40,9 +40,11 @@ const KNEE_MPS: f64 = 1.5;
 /// the knee. The two limits of what a body may do; the second is paid for in the penalty.
 const GROWTHS: [fn(f64) -> f64; 2] =
     [|speed_mps| speed_mps, |speed_mps| KNEE_MPS * speed_mps / speed_mps.hypot(KNEE_MPS)];
-/// Instants at which a step is tried: every ten seconds of a ladder. 15 at first; the finer grid costs a
+/// Instants from which another response is tried: every ten seconds of a ladder. 15 at first; the finer grid costs a
 /// logarithm of their ratio in the penalty, 1.1 nats.
 const STEPS: usize = 47;
+/// Bins of two groups that begin at nearly the same time, s.
+const SAME_INSTANT_S: f64 = 1.0;
 /// Shortest period of a swing that is tried, s: ten bins.
 const SHORTEST_SWING_S: f64 = 30.0;
 /// Quarter turns of the slowest swing that is tried: what turns less is a curve in time.
@@ -240,15 +242,22 @@ fn after(time: &[Vec<f64>], at_s: f64) -> Vec<Vec<f64>> {
     map(time, &|t| if t < at_s { 0.0 } else { 1.0 })
 }
 
-/// Steps at instants spread over the flight.
+/// Steps between any two bins that follow each other: half a minute beside the true instant, the shared air explains a
+/// sharp step better than a step does.
 fn steps(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
-    instants(time).map(|at_s| Generic {
+    let mut moments = time.concat();
+    moments.sort_by(f64::total_cmp);
+    moments.dedup_by(|later, earlier| *later - *earlier < SAME_INSTANT_S);
+    let between: Vec<f64> =
+        moments.windows(2).map(|pair| f64::midpoint(pair[0], pair[1])).collect();
+    let penalty = (between.len() as f64).ln();
+    between.into_iter().map(move |at_s| Generic {
         depends_on: Dependence::Step,
         axis: "time since arming (s)",
         columns: vec![Column::Shared(after(time, at_s))],
         felt: Vec::new(),
         along: time.to_vec(),
-        penalty: (STEPS as f64).ln(),
+        penalty,
     })
 }
 
@@ -440,6 +449,23 @@ mod tests {
 
     fn times() -> Vec<Vec<f64>> {
         vec![(0..170).map(|bin| 40.0 + 3.0 * f64::from(bin)).collect()]
+    }
+
+    #[test]
+    fn a_step_between_any_two_bins_is_found_and_groups_in_step_are_one() {
+        let time = times();
+        for bin in 1..time[0].len() {
+            let step: Vec<f64> =
+                (0..time[0].len()).map(|place| if place < bin { -2.0 } else { -1.0 }).collect();
+            let of = |family: &Generic| {
+                let after = family.columns[0].means().concat();
+                after.iter().zip(&step).all(|(one, other)| *one == other + 2.0)
+            };
+            assert!(steps(&time).any(|family| of(&family)), "before bin {bin}");
+        }
+        let other: Vec<f64> = time[0].iter().map(|time_s| time_s + 0.5).collect();
+        let both = vec![time[0].clone(), other];
+        assert_eq!(steps(&both).count(), steps(&time).count());
     }
 
     #[test]
