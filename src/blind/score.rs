@@ -230,6 +230,8 @@ fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
                 if hidden.foreign { Called::Named } else { Called::InClass }
             }
             Finding::Unknown { .. } => Called::Unknown,
+            // What the library has come to have for it is no longer unknown.
+            Finding::Name { effect, .. } if is_alike(hidden, effect) => Called::Named,
             _ if hidden.foreign => {
                 let fits = step.finding.effects().iter().any(|one| accepts_name(hidden, one));
                 if fits { Called::InClass } else { Called::Silent }

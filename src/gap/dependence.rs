@@ -35,6 +35,8 @@ pub enum Dependence {
     Step,
     /// Product of vertical air speed and time.
     ClimbTime,
+    /// Product of vertical air speed and height.
+    ClimbHeight,
 }
 
 impl Dependence {
@@ -52,6 +54,7 @@ impl Dependence {
             Self::Heading => "heading",
             Self::Step => "step",
             Self::ClimbTime => "climb-time",
+            Self::ClimbHeight => "climb-height",
         }
     }
 
@@ -65,6 +68,9 @@ impl Dependence {
         match self {
             Self::Climb => signal == Signal::Climb,
             Self::ClimbTime => matches!(signal, Signal::Climb | Signal::Time),
+            Self::ClimbHeight => {
+                matches!(signal, Signal::Climb | Signal::Height | Signal::Density)
+            }
             Self::Height => matches!(signal, Signal::Height | Signal::Density),
             Self::Time | Self::Step => matches!(signal, Signal::Time | Signal::ChargeUsed),
             Self::Wind | Self::Lean | Self::Heading => {
@@ -110,7 +116,7 @@ pub(super) fn depends_on_no_more(one: &str, than: &str) -> bool {
     signals_of(one).iter().all(is_shared)
 }
 
-const ALL: [Dependence; 11] = [
+const ALL: [Dependence; 12] = [
     Dependence::Climb,
     Dependence::Height,
     Dependence::Time,
@@ -122,6 +128,7 @@ const ALL: [Dependence; 11] = [
     Dependence::Heading,
     Dependence::Step,
     Dependence::ClimbTime,
+    Dependence::ClimbHeight,
 ];
 
 impl fmt::Display for Dependence {

@@ -54,6 +54,8 @@ const FEWEST_QUARTERS: usize = 8;
 const OF_THE_LADDER: f64 = 0.4;
 /// Step of the derivative by vertical air speed, m/s. Numerical.
 const SLOPE_STEP: f64 = 0.01;
+/// Half of a range of height from which a response may change with it, m. Chosen.
+const LEAST_HALF_M: f64 = 5.0;
 /// A charge that changes by less, as a share, says nothing. Chosen.
 const LEAST_CHARGE: f64 = 0.05;
 /// A component of the air from the nose that spans less says nothing, m/s. Chosen.
@@ -79,6 +81,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found.extend(smooth(Dependence::Wind, "horizontal air speed (m/s)", &wind, 3, 1.5));
     found.extend(waves(&height));
     found.push(climb_times_time(&climb, &time));
+    found.extend(climb_times_height(&climb, &height));
     found.extend(swings(&climb, &time));
     found.extend(steps(&time));
     found.extend(changes(&climb, &time));
@@ -192,26 +195,63 @@ fn climb_times_time(climb: &[Vec<f64>], time: &[Vec<f64>]) -> Generic {
     }
 }
 
+/// The product of climb speed and height, where the flight spans enough of both.
+fn climb_times_height(climb: &[Vec<f64>], height: &[Vec<f64>]) -> Option<Generic> {
+    let middle = f64::midpoint(least(height), most(height));
+    let half = span(height) / 2.0;
+    let shows = span(climb) > 0.5 && half.is_finite() && half > LEAST_HALF_M;
+    let part = map(height, &|height| (height - middle) / half);
+    let product = |(climb, part): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+        climb.iter().zip(part).map(|(climb, part)| climb * part).collect()
+    };
+    let crossed: Vec<Vec<f64>> = climb.iter().zip(&part).map(product).collect();
+    shows.then(|| Generic {
+        depends_on: Dependence::ClimbHeight,
+        axis: "vertical velocity times height, scaled",
+        felt: vec![straight(part), straight(map(climb, &|_| 1.0))],
+        columns: vec![Column::Shared(crossed.clone()), Column::Shared(climb.to_vec())],
+        along: crossed,
+        penalty: 2.0,
+    })
+}
+
 /// Swings in time with one period, from [`SHORTEST_SWING_S`] to half of the flight. Neighbours differ by a
 /// quarter of a turn over the whole flight, so that between them a twentieth of a swing's square is lost at most.
-/// A period of the ladder's own is none: what goes with it goes with the climb.
+/// Of a swing with the ladder's own period only that part is one that is at rest where the ladder is fastest: the rest goes
+/// with the climb.
 fn swings<'a>(climb: &'a [Vec<f64>], time: &'a [Vec<f64>]) -> impl Iterator<Item = Generic> + 'a {
     let ladder = without_mean(climb);
     let span_s = span(time);
     let most = if span_s.is_finite() { (4.0 * span_s / SHORTEST_SWING_S) as usize } else { 0 };
     let count = most.saturating_sub(FEWEST_QUARTERS - 1);
-    (FEWEST_QUARTERS..=most).filter_map(move |quarters| {
+    (FEWEST_QUARTERS..=most).map(move |quarters| {
         let per_s = std::f64::consts::FRAC_PI_2 * quarters as f64 / span_s;
         let phases = [f64::sin, f64::cos].map(|of| map(time, &|t: f64| of(per_s * t)));
-        (share_in(&phases, &ladder) < OF_THE_LADDER).then(|| Generic {
+        let phases = if share_in(&phases, &ladder) < OF_THE_LADDER {
+            phases.map(Column::Shared).to_vec()
+        } else {
+            vec![Column::Shared(across(&phases, &ladder))]
+        };
+        Generic {
             depends_on: Dependence::Time,
             axis: "time since arming (s)",
-            columns: phases.map(Column::Shared).into(),
+            penalty: 2.0 * (phases.len() as f64 - 1.0) + (count as f64).ln(),
+            columns: phases,
             felt: Vec::new(),
             along: time.to_vec(),
-            penalty: 2.0 + (count as f64).ln(),
-        })
+        }
     })
+}
+
+/// The swing of a period that has nothing of a series: between its turns where the series has its own.
+fn across([sin, cos]: &[Vec<Vec<f64>>; 2], series: &DVector<f64>) -> Vec<Vec<f64>> {
+    let along = |phase: &[Vec<f64>]| without_mean(phase).dot(series);
+    let (of_sin, of_cos) = (along(sin), along(cos));
+    let size = of_sin.hypot(of_cos).max(f64::MIN_POSITIVE);
+    let (of_sin, of_cos) = (of_sin / size, of_cos / size);
+    let at = |(sin, cos): (&f64, &f64)| of_cos * sin - of_sin * cos;
+    let group = |(sin, cos): (&Vec<f64>, &Vec<f64>)| sin.iter().zip(cos).map(at).collect();
+    sin.iter().zip(cos).map(group).collect()
 }
 
 fn without_mean(values: &[Vec<f64>]) -> DVector<f64> {
@@ -485,20 +525,50 @@ mod tests {
     }
 
     #[test]
-    fn a_swing_with_the_ladders_own_period_is_none() {
+    fn a_swing_with_the_ladders_own_period_is_what_the_climb_has_nothing_of() {
         let time = times();
         // Up and down in a minute, faster every time.
         let climb = map(&time, &|t| {
             let faster = 0.5 + (t - 40.0) / 200.0;
             if (t / 30.0).floor() % 2.0 == 0.0 { faster } else { -faster }
         });
-        let swing =
-            |period_s: f64| map(&time, &|t| (std::f64::consts::TAU * t / period_s).sin()).concat();
-        let left =
-            |climb: &[Vec<f64>], period_s| least_left(swings(climb, &time), &swing(period_s));
+        let swing = |period_s: f64, phase: f64| {
+            map(&time, &|t| (std::f64::consts::TAU * t / period_s + phase).sin()).concat()
+        };
+        let left = |climb: &[Vec<f64>], period_s, phase| {
+            least_left(swings(climb, &time), &swing(period_s, phase))
+        };
         let still = map(&time, &|_| 0.0);
-        assert!(left(&still, 60.0) < 0.06 && left(&climb, 60.0) > 0.5);
-        assert!(left(&climb, 91.0) < 0.06 && left(&climb, 45.0) < 0.06);
+        assert!(left(&still, 60.0, 0.0) < 0.06);
+        assert!(left(&climb, 60.0, 0.0) > 0.5, "it goes with the climb");
+        assert!(left(&climb, 60.0, std::f64::consts::FRAC_PI_2) < 0.1, "it turns between");
+        assert!(left(&climb, 91.0, 0.0) < 0.06 && left(&climb, 45.0, 0.0) < 0.06);
+        let climb = without_mean(&climb);
+        let of_one = swings(&[climb.as_slice().to_vec()], &time)
+            .filter(|family| family.columns.len() == 1)
+            .map(|family| without_mean(&[family.columns[0].means().concat()]))
+            .collect::<Vec<_>>();
+        assert!(!of_one.is_empty());
+        for swing in of_one {
+            let likeness = swing.dot(&climb) / (swing.norm() * climb.norm());
+            assert!(likeness.abs() < 1e-9, "{likeness}");
+        }
+    }
+
+    #[test]
+    fn a_response_that_changes_with_height_is_found_where_a_flight_spans_some() {
+        let time = times();
+        let climb = map(&time, &|t| 3.0 * (0.37 * t).sin());
+        let of = |span_m: f64| {
+            let height = map(&time, &|t| 20.0 + span_m * (0.5 + 0.5 * (0.05 * t).cos()));
+            let at = climb[0].iter().zip(&height[0]);
+            let series: Vec<f64> = at.map(|(climb, h)| climb * (4.0 + 0.2 * h)).collect();
+            climb_times_height(&climb, &height).map(|family| left(&family, &series))
+        };
+        assert!(of(40.0).is_some_and(|left| left < 1e-9));
+        assert_eq!(of(9.0), None, "little height says little");
+        assert!(climb_times_height(&[vec![0.0; 9]], &[vec![20.0; 9]]).is_none());
+        assert!(climb_times_height(&[vec![]], &[vec![]]).is_none());
     }
 
     #[test]

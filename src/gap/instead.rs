@@ -20,6 +20,10 @@ const MOST: usize = 5;
 /// flown in an updraft half a metre per second off explains a fifth less.
 const SHARE: f64 = 0.5;
 
+/// Effects that explain a flight in updrafts which differ by more are told apart only by how each bends the curve, m/s: one
+/// must explain clearly more. Chosen: twice what a flight tells of its updraft.
+const OTHER_AIR_MPS: f64 = 0.1;
+
 /// A search that ended, and how well its findings explain the flight, nats.
 struct Ended {
     found: Found,
@@ -146,8 +150,9 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     if is_unknown && !is_instead {
         return as_it_is(there);
     }
-    let most = best.nats.max(there.nats);
-    let near_nats = most - margin_nats(gain(if is_instead { &best.found } else { &there.found }));
+    let told = if is_instead { best } else { &there };
+    let (most, margin) = (best.nats.max(there.nats), margin_nats(gain(&told.found)));
+    let updraft_mps = told.found.updraft_mps;
     let mut names = Vec::new();
     if is_single && !is_instead {
         names.extend(there.found.steps[0].finding.effects().into_iter().map(str::to_owned));
@@ -155,7 +160,11 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     // Who was found first must be beaten clearly.
     let is_beside = is_single && is_instead && there.nats > most - PRODUCT_NATS;
     let beside = is_beside.then(|| leads(&there.found));
-    let near = others.iter().filter(|other| other.nats > near_nats);
+    let is_near = |other: &&Ended| {
+        let is_in_other_air = (other.found.updraft_mps - updraft_mps).abs() > OTHER_AIR_MPS;
+        other.nats > most - if is_in_other_air { margin.max(PRODUCT_NATS) } else { margin }
+    };
+    let near = others.iter().filter(is_near);
     for name in near.flat_map(|other| leads(&other.found)).chain(beside.into_iter().flatten()) {
         if !names.contains(&name) {
             names.push(name);
@@ -219,6 +228,22 @@ mod tests {
         assert_eq!(told(found(), others()), ["response-drift/vortex-ring/thrust-curve"]);
         let far = vec![ended(12.0, &["response-drift"]), ended(5.0, &["vortex-ring"])];
         assert_eq!(told(found(), far), ["response-drift/thrust-curve"]);
+    }
+
+    #[test]
+    fn an_effect_in_another_updraft_must_be_beaten_clearly() {
+        let in_air = |nats: f64, effect: &str, updraft_mps: f64| {
+            let mut ended = ended(nats, &[effect]);
+            ended.found.updraft_mps = updraft_mps;
+            ended
+        };
+        let beside = |nats: f64, updraft_mps: f64| {
+            let others = vec![in_air(nats, "vortex-ring", updraft_mps)];
+            told(in_air(0.0, "thrust-curve", -0.4), others).concat()
+        };
+        assert_eq!(beside(-12.0, -0.45), "thrust-curve");
+        assert_eq!(beside(-12.0, -0.2), "thrust-curve/vortex-ring");
+        assert_eq!(beside(-14.0, -0.2), "thrust-curve");
     }
 
     #[test]

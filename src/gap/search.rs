@@ -363,14 +363,17 @@ fn free_shapes(
     best
 }
 
-/// A product of climb and time comes with a line over the climb: where a curve over the climb explains as much, that is
+/// A product of climb and another comes with a line over the climb: where a curve over the climb explains as much, that is
 /// what it is.
 fn drop_idle_product(found: &mut Vec<RankedGeneric>, sought: Sought<'_>) {
     let depends_on = |one: &RankedGeneric| sought.generics[one.generic].depends_on;
     let curve = found.iter().find(|one| depends_on(one) == Dependence::Climb);
     if let Some(curve_nats) = curve.map(|one| one.gain).filter(|nats| *nats > FREE_FLOOR_NATS) {
         let least = curve_nats + FLOOR_NATS;
-        found.retain(|one| depends_on(one) != Dependence::ClimbTime || one.gain > least);
+        let is_product = |one: &RankedGeneric| {
+            matches!(depends_on(one), Dependence::ClimbTime | Dependence::ClimbHeight)
+        };
+        found.retain(|one| !is_product(one) || one.gain > least);
     }
 }
 

@@ -169,7 +169,7 @@ pub enum Finding {
     },
     /// Nothing in the library, but it depends on something.
     Unknown {
-        /// What it depends on: `climb`, `time`, `height`, `wind`, `voltage`, `climb-time`,
+        /// What it depends on: `climb`, `time`, `height`, `wind`, `voltage`, `climb-time`, `climb-height`,
         /// `heading`, `step`.
         #[schemars(with = "String")]
         depends_on: Dependence,

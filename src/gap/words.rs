@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::decide::PRODUCT;
 use super::dependence::Dependence;
 use super::verdict::{Finding, Fitted, Step, Verdict, is_strong_wind};
 use crate::effects::Role;
@@ -36,11 +35,22 @@ pub fn member(name: &str) -> &str {
     match name {
         "updraft-drift" => "an updraft that changes steadily",
         "updraft-profile" => "an updraft that grows with height",
-        name if name == PRODUCT.name() => {
-            "something unknown that depends on climb speed times time"
-        }
-        name if name == Dependence::Climb.name() => "something unknown that depends on climb speed",
-        effect => effect,
+        name => Dependence::of(name).map_or(name, |depends_on| unknown(depends_on)),
+    }
+}
+
+/// Something unknown that depends on a quantity, in words.
+fn unknown(depends_on: Dependence) -> &'static str {
+    match depends_on {
+        Dependence::Climb => "something unknown that depends on climb speed",
+        Dependence::Height => "something unknown that depends on height",
+        Dependence::Time | Dependence::Step => "something unknown that depends on time",
+        Dependence::Wind | Dependence::Lean => "something unknown that depends on the wind",
+        Dependence::Voltage => "something unknown that depends on the voltage",
+        Dependence::Place | Dependence::Drone => "something unknown that depends on the drone",
+        Dependence::Heading => "something unknown that depends on the heading",
+        Dependence::ClimbTime => "something unknown that depends on climb speed times time",
+        Dependence::ClimbHeight => "something unknown that depends on climb speed times height",
     }
 }
 

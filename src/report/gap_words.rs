@@ -134,6 +134,7 @@ pub(super) fn depends_on(on: Dependence) -> &'static str {
     match on {
         Dependence::Climb => "climb speed",
         Dependence::ClimbTime => "climb × time",
+        Dependence::ClimbHeight => "climb × height",
         Dependence::Wind => "horizontal speed",
         Dependence::Voltage => "charge",
         Dependence::Step => "time, a step",

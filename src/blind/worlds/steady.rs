@@ -3,17 +3,19 @@
 use foreign_worlds::hidden::{self, HiddenEffect};
 use foreign_worlds::{Condition, Trim, World};
 
-use crate::effects::Signals;
+use crate::blind::tables::FOREIGN_KINDS;
+use crate::effects::{Signals, Sought, find};
 use crate::gap::{SteadyPulse, There};
 
-/// Hidden effects of a world, as the calculation of their Fisher z takes them. Those that steady flight does
-/// not show, or by which drones differ, are handed over without a form: their z is not known.
+/// Hidden effects of a world, as the calculation of their Fisher z takes them. Those that the pulse of steady flight
+/// does not show, or by which drones differ, are handed over without a form: their z is not known.
 pub fn there(world: &World) -> Vec<There<'_>> {
     world.hidden.iter().map(|effect| one(world, effect)).collect()
 }
 
 fn one<'a>(world: &'a World, effect: &'a HiddenEffect) -> There<'a> {
-    let is_steady = hidden::find(&effect.kind).is_some_and(|kind| kind.is_steady);
+    let is_steady = hidden::find(&effect.kind).is_some_and(|kind| kind.is_steady)
+        && !is_told_elsewhere(&effect.kind);
     match effect.start().filter(|_| is_steady) {
         None => There::Effect { effect: "", size: "", change: 0.0 },
         Some(acting) => {
@@ -31,6 +33,14 @@ fn one<'a>(world: &'a World, effect: &'a HiddenEffect) -> There<'a> {
             There::Pulse(pulse)
         }
     }
+}
+
+/// Whether the library's effect of a kind is told by another channel than the pulse, the lean or the velocity: how well
+/// depends on what is known of the wind.
+fn is_told_elsewhere(kind: &str) -> bool {
+    let kind = FOREIGN_KINDS.iter().find(|one| one.name == kind);
+    let effect = kind.and_then(|kind| kind.like).and_then(find);
+    effect.is_some_and(|effect| matches!(effect.definition().sought, Sought::No(_)))
 }
 
 /// The moment of a comparison in the plant's terms.
@@ -55,3 +65,15 @@ fn condition(world: &World, signals: &Signals, heading_rad: f64) -> Condition {
 
 /// Time that a full battery lasts in hover, s: the middle of what is drawn.
 const ENDURANCE_S: f64 = 1_800.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_leans_and_velocities_tell_has_no_z_as_at_home() {
+        let elsewhere = FOREIGN_KINDS.iter().filter(|kind| is_told_elsewhere(kind.name));
+        let names: Vec<&str> = elsewhere.map(|kind| kind.name).collect();
+        assert_eq!(names, ["hub-force", "log-lag", "log-bias", "loop-lag", "momentum-drag"]);
+    }
+}

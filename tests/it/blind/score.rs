@@ -167,6 +167,15 @@ fn the_unknown_is_recognised_by_what_it_depends_on() {
 }
 
 #[test]
+fn what_the_library_has_come_to_have_is_no_longer_unknown() {
+    let outcome = scored(&["climb-time"], vec![plain("response-drift")]);
+    assert_eq!(outcome.hidden[0].called, Called::Named);
+    assert!(outcome.wrong_names.is_empty());
+    let outcome = scored(&["step"], vec![plain("response-drift")]);
+    assert_eq!(outcome.hidden[0].called, Called::Silent);
+}
+
+#[test]
 fn the_sensor_channel_is_a_name_too() {
     let truth = truth(Base::Airsim, &["velocity-bias"]);
     let value = truth.hidden[0].value();

@@ -9,7 +9,7 @@ const LEVEL_M: f64 = 40.0;
 pub(super) const KIND: Kind = Kind {
     name: "height-response",
     what: "the response to vertical speed changes with height",
-    depends_on: &["height", "climb"],
+    depends_on: &["climb-height", "height", "climb"],
     parameters: &[either("slope_us", 4.0, 14.0)],
     is_steady: true,
     start: |values| Box::new(HeightResponse { slope_us: values[0] }),
