@@ -98,6 +98,11 @@ fn felt_as(signal: Signal) -> Signal {
     if signal == Signal::ModelIncrement { Signal::Climb } else { signal }
 }
 
+/// Whether an effect depends on the climb.
+pub(super) fn depends_on_climb(effect: &str) -> bool {
+    signals_of(effect).iter().any(|signal| felt_as(*signal) == Signal::Climb)
+}
+
 /// Whether two effects depend on a common signal.
 pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
     let is_shared =

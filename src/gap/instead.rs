@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::contest::PRODUCT_NATS;
 use super::decide::{CLASS_NATS, margin_nats};
-use super::dependence::depends_on_no_more;
+use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Only, Options};
 use super::verdict::{Finding, Step};
@@ -132,7 +132,8 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     if first.nats >= there.nats && first.found.steps.is_empty() && is_all {
         return as_it_is(others.swap_remove(0));
     }
-    others.retain(|other| !other.found.steps.is_empty());
+    let still = others.iter().position(|other| other.found.steps.is_empty());
+    let still = still.map(|place| others.remove(place)).map(|it| (it.nats, it.found.updraft_mps));
     let Some(best) = others.first() else { return as_it_is(there) };
     let gain = |of: &Found| of.steps.iter().map(|step| step.gain_nats).fold(0.0, f64::max);
     // One effect that was not found before is simpler than several of its kind, if it explains nearly as much.
@@ -171,6 +172,16 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
         }
     }
     let ended = if is_instead { others.swap_remove(0) } else { there };
+    // Elsewhere the model itself explains nearly as much: what the updraft then leaves of the climb is in doubt.
+    let is_elsewhere = |(nats, mps): (f64, f64)| {
+        ended.nats < nats + PRODUCT_NATS && (mps - ended.found.updraft_mps).abs() > OTHER_AIR_MPS
+    };
+    if let [name] = &names[..]
+        && depends_on_climb(name)
+        && still.is_some_and(is_elsewhere)
+    {
+        names.push(Dependence::Climb.name().to_owned());
+    }
     Decided { ended, names }
 }
 
@@ -244,6 +255,19 @@ mod tests {
         assert_eq!(beside(-12.0, -0.45), "thrust-curve");
         assert_eq!(beside(-12.0, -0.2), "thrust-curve/vortex-ring");
         assert_eq!(beside(-14.0, -0.2), "thrust-curve");
+    }
+
+    #[test]
+    fn an_effect_that_needs_another_updraft_must_explain_clearly_more_than_nothing() {
+        let of = |nats: f64, updraft_mps: f64, effect: &str| {
+            let mut there = ended(nats, &[effect]);
+            there.found.updraft_mps = updraft_mps;
+            told(there, vec![ended(0.0, &[]), ended(nats - 30.0, &["vortex-ring"])]).concat()
+        };
+        assert_eq!(of(12.0, 0.2, "thrust-curve"), "thrust-curve/climb");
+        assert_eq!(of(14.0, 0.2, "thrust-curve"), "thrust-curve");
+        assert_eq!(of(12.0, 0.05, "thrust-curve"), "thrust-curve");
+        assert_eq!(of(12.0, 0.2, "motor-thermal"), "motor-thermal", "it has nothing of the climb");
     }
 
     #[test]

@@ -363,13 +363,15 @@ fn free_shapes(
     best
 }
 
-/// A product of climb and another comes with a line over the climb: where a curve over the climb explains as much, that is
-/// what it is.
+/// A product of climb and another comes with a line over the climb, and a change of the response from one moment on with a
+/// step: where a curve over the climb, or a step, explains as much, that is what it is.
 fn drop_idle_product(found: &mut Vec<RankedGeneric>, sought: Sought<'_>) {
     let depends_on = |one: &RankedGeneric| sought.generics[one.generic].depends_on;
-    let curve = found.iter().find(|one| depends_on(one) == Dependence::Climb);
-    if let Some(curve_nats) = curve.map(|one| one.gain).filter(|nats| *nats > FREE_FLOOR_NATS) {
-        let least = curve_nats + FLOOR_NATS;
+    let is_simpler =
+        |one: &&RankedGeneric| matches!(depends_on(one), Dependence::Climb | Dependence::Step);
+    let simpler = found.iter().filter(is_simpler).map(|one| one.gain).reduce(f64::max);
+    if let Some(simpler_nats) = simpler.filter(|nats| *nats > FREE_FLOOR_NATS) {
+        let least = simpler_nats + FLOOR_NATS;
         let is_product = |one: &RankedGeneric| {
             matches!(depends_on(one), Dependence::ClimbTime | Dependence::ClimbHeight)
         };
@@ -477,7 +479,7 @@ mod tests {
     }
 
     #[test]
-    fn a_product_is_more_than_the_line_that_it_comes_with() {
+    fn a_product_is_more_than_what_it_comes_with() {
         let free = |depends_on| Generic {
             depends_on,
             axis: "",
@@ -486,8 +488,6 @@ mod tests {
             along: Vec::new(),
             penalty: 0.0,
         };
-        let generics = [Dependence::Climb, Dependence::ClimbTime].map(free);
-        let sought = Sought { library: &[], generics: &generics, drones: &[] };
         let ranked = |generic: usize, gain: f64| RankedGeneric {
             generic,
             gain,
@@ -497,13 +497,22 @@ mod tests {
             range_us: 3.0,
             hyper: Hyper::default(),
         };
-        let is_left = |curve_nats: f64, product_nats: f64| {
-            let mut found = vec![ranked(1, product_nats), ranked(0, curve_nats)];
-            drop_idle_product(&mut found, sought);
-            found.len() == 2
-        };
-        assert!(!is_left(30.0, 35.0) && !is_left(30.0, 38.0) && is_left(30.0, 38.0 + 1e-9));
-        assert!(is_left(14.0, 15.0), "a curve that is none takes nothing away");
+        let pairs = [
+            [Dependence::Climb, Dependence::ClimbTime],
+            [Dependence::Step, Dependence::ClimbTime],
+            [Dependence::Climb, Dependence::ClimbHeight],
+        ];
+        for pair in pairs {
+            let generics = pair.map(free);
+            let sought = Sought { library: &[], generics: &generics, drones: &[] };
+            let is_left = |simple_nats: f64, product_nats: f64| {
+                let mut found = vec![ranked(1, product_nats), ranked(0, simple_nats)];
+                drop_idle_product(&mut found, sought);
+                found.len() == 2
+            };
+            assert!(!is_left(30.0, 35.0) && !is_left(30.0, 38.0) && is_left(30.0, 38.0 + 1e-9));
+            assert!(is_left(14.0, 15.0), "a shape that is none takes nothing away: {pair:?}");
+        }
     }
 
     #[test]
