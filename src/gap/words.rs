@@ -1,5 +1,6 @@
 //! The verdict in plain words.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use super::dependence::Dependence;
@@ -24,40 +25,47 @@ pub fn phrase(finding: &Finding) -> String {
         ),
         Finding::Unknown { depends_on, formula } => {
             let shape = formula.as_ref().map_or_else(String::new, |text| format!(", about {text}"));
-            format!("something that is not in the library and depends on {depends_on}{shape}")
+            let quantity = quantity(*depends_on);
+            format!("something that is not in the library and depends on {quantity}{shape}")
         }
     }
 }
 
 /// A member of a class in words: effects by their names; motions of the air and what something unknown would
 /// depend on by what they are.
-pub fn member(name: &str) -> &str {
+pub fn member(name: &str) -> Cow<'_, str> {
     match name {
-        "updraft-drift" => "an updraft that changes steadily",
-        "updraft-profile" => "an updraft that grows with height",
-        name => Dependence::of(name).map_or(name, |depends_on| unknown(depends_on)),
+        "updraft-drift" => "an updraft that changes steadily".into(),
+        "updraft-profile" => "an updraft that grows with height".into(),
+        name => Dependence::of(name).map_or_else(
+            || name.into(),
+            |on| format!("something unknown that depends on {}", quantity(on)).into(),
+        ),
     }
 }
 
-/// Something unknown that depends on a quantity, in words.
-fn unknown(depends_on: Dependence) -> &'static str {
+/// The quantity that something unknown depends on, in words.
+pub fn quantity(depends_on: Dependence) -> &'static str {
     match depends_on {
-        Dependence::Climb => "something unknown that depends on climb speed",
-        Dependence::Height => "something unknown that depends on height",
-        Dependence::Time | Dependence::Step => "something unknown that depends on time",
-        Dependence::Wind | Dependence::Lean => "something unknown that depends on the wind",
-        Dependence::Voltage => "something unknown that depends on the voltage",
-        Dependence::Place | Dependence::Drone => "something unknown that depends on the drone",
-        Dependence::Heading => "something unknown that depends on the heading",
-        Dependence::ClimbTime => "something unknown that depends on climb speed times time",
-        Dependence::ClimbHeight => "something unknown that depends on climb speed times height",
+        Dependence::Climb => "climb speed",
+        Dependence::ClimbTime => "climb speed times time",
+        Dependence::ClimbHeight => "climb speed times height",
+        Dependence::Height => "height",
+        Dependence::Time => "time",
+        Dependence::Step => "time, in a step",
+        Dependence::Wind => "the wind",
+        Dependence::Lean => "the lean",
+        Dependence::Voltage => "the charge",
+        Dependence::Place => "the drone's place",
+        Dependence::Drone => "the drone",
+        Dependence::Heading => "the heading",
     }
 }
 
-fn either(names: &[&str]) -> String {
+fn either(names: &[Cow<'_, str>]) -> String {
     match names {
         [] => String::new(),
-        [one] => (*one).to_owned(),
+        [one] => one.to_string(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
     }
 }
@@ -110,6 +118,8 @@ pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
     let mut text = if verdict.is_unexplained() {
         "Something is missing, and this comparison cannot say what.".to_owned()
+    } else if verdict.steps.is_empty() && is_strong_wind && verdict.gap.left_over().is_some() {
+        "This flight cannot tell whether something is missing.".to_owned()
     } else if verdict.steps.is_empty() {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
         format!(

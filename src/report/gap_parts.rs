@@ -7,13 +7,13 @@ use crate::effects;
 use crate::gap::Dependence;
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Fitted, Shrink, Step};
-use crate::gap::words::{member, phrase};
+use crate::gap::words::{member, phrase, quantity};
 
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
 use super::gap_words::{
-    after_mps, depends_on, in_field, kind, lost, micro, minus, number, or_none, per_thousand,
-    percent, range_to, regime_title, with_unit,
+    after_mps, in_field, kind, lost, micro, minus, number, or_none, per_thousand, percent,
+    range_to, regime_title, with_unit,
 };
 use super::page::{Gallery, capitalised};
 use super::text::{NONE, clean, count, fixed, reduced, sentence, signed, unit};
@@ -121,7 +121,7 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
 fn heading(finding: &Finding) -> String {
     let title = |name: &str| {
         effects::find(name)
-            .map_or_else(|| clean(member(name)), |one| one.definition().title.to_owned())
+            .map_or_else(|| clean(&member(name)), |one| one.definition().title.to_owned())
     };
     match finding {
         Finding::Name { effect, .. } => title(effect),
@@ -129,7 +129,7 @@ fn heading(finding: &Finding) -> String {
             effects.iter().map(|name| title(name)).collect::<Vec<_>>().join(" or ")
         }
         Finding::Unknown { depends_on: on, .. } => {
-            format!("Something unknown that depends on {}", depends_on(*on))
+            format!("Something unknown that depends on {}", quantity(*on))
         }
     }
 }
@@ -160,7 +160,7 @@ fn what_it_means(finding: &Finding) -> String {
 /// An effect in the library's own words.
 fn described(name: &str) -> Value {
     effects::find(name).map_or_else(
-        || context! { name => clean(name), title => clean(member(name)), what => "", why => "", formula => "", source => "" },
+        || context! { name => clean(name), title => clean(&member(name)), what => "", why => "", formula => "", source => "" },
         |effect| {
             let one = effect.definition();
             context! {

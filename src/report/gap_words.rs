@@ -129,19 +129,6 @@ pub(super) fn kind(finding: &Finding) -> &'static str {
     }
 }
 
-/// What a free shape depends on.
-pub(super) fn depends_on(on: Dependence) -> &'static str {
-    match on {
-        Dependence::Climb => "climb speed",
-        Dependence::ClimbTime => "climb × time",
-        Dependence::ClimbHeight => "climb × height",
-        Dependence::Wind => "horizontal speed",
-        Dependence::Voltage => "charge",
-        Dependence::Step => "time, a step",
-        other => other.name(),
-    }
-}
-
 /// What a regime is by.
 pub(super) fn regime_title(by: Dependence) -> &'static str {
     match by {

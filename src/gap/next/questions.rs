@@ -72,7 +72,7 @@ pub fn ask(verdict: &Verdict) -> Vec<Question> {
         Finding::Name { .. } => None,
         Finding::Class { effects, parameters } => Some(Question {
             words: {
-                let members: Vec<&str> = effects.iter().map(|name| member(name)).collect();
+                let members: Vec<_> = effects.iter().map(|name| member(name)).collect();
                 format!("is it {}?", members.join(" or "))
             },
             sought: Sought::Apart {

@@ -72,7 +72,7 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
         // Only where nothing else lies in it.
         let _ = std::fs::remove_dir(folder);
         return Err(WorkflowError::Nothing(format!(
-            "no drone can fly this: {vehicle}, {} in {} air, {:+.1} m/s of updraft{}; the folder holds no game",
+            "no drone can fly this: {vehicle}, {} in {} air, {:+.1} m/s of updraft{}; no game was made, try another seed or milder air",
             game.protocol.template(),
             game.air.name(),
             game.updraft_mps,

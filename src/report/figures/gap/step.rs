@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use crate::gap::Dependence;
 use crate::gap::verdict::{Finding, Rival, Shape, Step};
+use crate::gap::words::quantity;
 use crate::report::Figure;
 use crate::report::axis::{Axis, nice_step};
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, FAINT, INK, MUTED, RULE, VERMILLION};
-use crate::report::gap_words::{depends_on, minus};
+use crate::report::gap_words::minus;
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, shortened, usable};
@@ -18,8 +19,8 @@ use super::{AFTER, axis_words};
 /// Most rivals that are drawn.
 const RIVALS: usize = 10;
 /// Where bars begin, how long the longest is, how far apart they are, pixels.
-const LEFT: f64 = 168.0;
-const LONGEST: f64 = 292.0;
+const LEFT: f64 = 226.0;
+const LONGEST: f64 = 234.0;
 const PITCH: f64 = 24.0;
 const TOP: f64 = 44.0;
 /// Room for a number, pixels.
@@ -107,13 +108,13 @@ fn bars(step: &Step, number: usize) -> Drawing {
         let y = TOP + PITCH * index as f64;
         let found = is_found(step, rival);
         let words = if rival.generic {
-            let on = Dependence::of(&rival.name).map(depends_on);
+            let on = Dependence::of(&rival.name).map(quantity);
             format!("any shape in {}", on.map_or_else(|| clean(&rival.name), str::to_owned))
         } else {
             clean(&rival.name)
         };
         let style = text(12.0, INK, Anchor::End, found);
-        drawing.text([LEFT - 8.0, y + 13.5], &shortened(&words, 26), style, 0.0);
+        drawing.text([LEFT - 8.0, y + 13.5], &shortened(&words, 37), style, 0.0);
         let end = at(rival.gain_nats);
         let (fill, stroke) = match (found, rival.generic) {
             (true, _) => (BLUE, ""),
