@@ -75,9 +75,9 @@ impl Question<'_> {
                 (found, gap) = (still, without);
             }
         }
+        let before = found.steps.clone();
         if !found.steps.is_empty() {
             let flown = |options: &Options| self.search(train, options);
-            let before = found.steps.clone();
             found = fewer_instead(found, self.options, flown)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;
@@ -86,7 +86,7 @@ impl Question<'_> {
         if !grows(&gap) {
             return Ok((found, gap));
         }
-        let found = self.withdrawn(train, found)?;
+        let found = self.withdrawn(train, found, &before)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
     }
@@ -130,14 +130,14 @@ impl Question<'_> {
         }
     }
 
-    /// The model as it was, with findings that name nothing alone.
-    fn withdrawn(self, train: &Data, found: Found) -> Result<Found, GapError> {
+    /// The model as it was, with findings that name nothing alone; `before` are those of the search that had rivals.
+    fn withdrawn(self, train: &Data, found: Found, before: &[Step]) -> Result<Found, GapError> {
         // The air stays as it is found, unless the model is nearer without it.
         let Self { repaired, simulated, plan, .. } = self;
         let is_still = found.updraft_mps == 0.0 || self.is_nearer_in_still_air(train, &found)?;
         let updraft_mps = if is_still { 0.0 } else { found.updraft_mps };
         let comparison = Comparison::of(train, repaired, simulated, plan, updraft_mps, None)?;
-        let steps = found.steps.into_iter().filter_map(withdrawn).collect();
+        let steps = found.steps.into_iter().filter_map(|step| withdrawn(step, before)).collect();
         let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
         Ok(Found { hyper, gusts_mps, updraft_mps, steps, rest, ..Found::nothing(comparison) })
     }
@@ -151,15 +151,15 @@ fn grows(gap: &Gap) -> bool {
     })
 }
 
-/// A finding that cannot be taken in: its effects with the rival that explains most. `None`: an effect without a rival,
-/// of which nothing can be said.
-fn withdrawn(mut step: Step) -> Option<Step> {
+/// A finding that cannot be taken in: its effects with the rival that explains most, by its own search or by those of
+/// `others` if nothing was searched for beside it. `None`: an effect without a rival, of which nothing can be said.
+fn withdrawn(mut step: Step, others: &[Step]) -> Option<Step> {
     if let Finding::Unknown { .. } = step.finding {
         return Some(step);
     }
     let mut effects: Vec<String> = step.finding.effects().into_iter().map(str::to_owned).collect();
-    let rivals = step.rivals.iter().filter(|rival| !effects.contains(&rival.name));
-    let near: Vec<String> = rivals.take(1).map(|rival| rival.name.clone()).collect();
+    let mut rivals = step.rivals.iter().chain(others.iter().flat_map(|other| &other.rivals));
+    let near = rivals.find(|rival| !effects.contains(&rival.name)).map(|rival| rival.name.clone());
     effects.extend(near);
     step.finding = Finding::Class { effects, parameters: Vec::new() };
     (step.finding.effects().len() > 1).then_some(step)
@@ -182,12 +182,16 @@ mod tests {
         let effects = |step: Option<Step>| {
             step.map(|step| step.finding.effects().join(" ")).unwrap_or_default()
         };
-        let beside = withdrawn(step(name("one"), &["one", "another", "third"]));
+        let alone = |step: Step| withdrawn(step, &[]);
+        let beside = alone(step(name("one"), &["one", "another", "third"]));
         assert!(matches!(beside.as_ref().unwrap().finding, Finding::Class { .. }));
         assert_eq!(effects(beside), "one another");
-        assert_eq!(withdrawn(step(name("one"), &["one"])), None);
+        assert_eq!(alone(step(name("one"), &["one"])), None);
+        // One effect that was searched for in place of all has no rivals of its own.
+        let others = [step(name("other"), &["one", "second"])];
+        assert_eq!(effects(withdrawn(step(name("one"), &["one"]), &others)), "one second");
         let unknown = Finding::Unknown { depends_on: Dependence::Climb, formula: None };
-        let kept = withdrawn(step(unknown.clone(), &["one"])).unwrap();
+        let kept = alone(step(unknown.clone(), &["one"])).unwrap();
         assert_eq!(kept.finding, unknown);
     }
 
