@@ -19,8 +19,8 @@ use super::{AFTER, axis_words};
 /// Most rivals that are drawn.
 const RIVALS: usize = 10;
 /// Where bars begin, how long the longest is, how far apart they are, pixels.
-const LEFT: f64 = 226.0;
-const LONGEST: f64 = 234.0;
+const LEFT: f64 = 256.0;
+const LONGEST: f64 = 204.0;
 const PITCH: f64 = 24.0;
 const TOP: f64 = 44.0;
 /// Room for a number, pixels.
