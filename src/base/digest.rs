@@ -12,6 +12,13 @@ pub fn hexadecimal(hash: Sha256) -> String {
     base16ct::lower::encode_string(&hash.finalize())
 }
 
+/// SHA-256 of a set of files by their own hashes, whatever their names and their order.
+pub fn sha256_of_files<'a>(hashes: impl IntoIterator<Item = &'a str>) -> String {
+    let mut hashes: Vec<&str> = hashes.into_iter().collect();
+    hashes.sort_unstable();
+    sha256(hashes.join("\n").as_bytes())
+}
+
 #[cfg(test)]
 mod tests {
     #[test]

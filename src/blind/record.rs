@@ -1,5 +1,7 @@
 //! The record of a game: what was hidden, what was said, and the hashes of both.
 
+use std::path::{Path, PathBuf};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +14,14 @@ use crate::base::digest::sha256;
 use crate::campaign::to_json;
 use crate::gap::Verdict;
 use crate::gap::verdict::Shrink;
+
+/// Name of the record of an opened seal.
+const RECORD: &str = "reveal.json";
+
+/// Path of the record of an opened seal, in the folder of a game.
+pub fn path(folder: &Path) -> PathBuf {
+    folder.join(RECORD)
+}
 
 /// Name and version of the format of `reveal.json`.
 pub const RECORD_SCHEMA: &str = "updraft.blind-record/1";

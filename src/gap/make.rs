@@ -155,6 +155,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     left_out.extend(data.left_out.iter().cloned());
     let used = DataUsed {
         logs: input.logs,
+        logs_sha256: String::new(),
         drones: data.drones(),
         groups: data.groups.iter().map(|g| (g.name.clone(), g.slots.len())).collect(),
         bins: whole.data.groups.iter().map(|group| group.bins.len()).collect(),

@@ -73,6 +73,10 @@ impl Verdict {
 pub struct DataUsed {
     /// Logs given.
     pub logs: usize,
+    /// SHA-256 of the SHA-256 hashes of these logs, sorted and separated by line feeds; empty: a verdict that was
+    /// written before hashes were.
+    #[serde(default)]
+    pub logs_sha256: String,
     /// Drones used.
     pub drones: usize,
     /// Command groups with their numbers of drones.
@@ -358,13 +362,22 @@ pub(super) fn is_strong_wind([x_mps, y_mps]: [f64; 2]) -> bool {
 }
 
 impl Gap {
+    /// The gap on held-out drones, if more is left there than noise and air would leave though held-out rungs keep no
+    /// more: then drones differ in how they answer the climb.
+    pub fn drones_differ(&self) -> Option<&Shrink> {
+        self.drones.as_ref().filter(|drones| keeps_more(drones) && self.left_over().is_none())
+    }
+
     /// The gap on held-out rungs, if more is left there than noise and air would leave.
     pub fn left_over(&self) -> Option<&Shrink> {
-        self.rungs.as_ref().filter(|rungs| {
-            let excess_us2 = rungs.after_without_air_us.powi(2) - rungs.floor_us.powi(2);
-            rungs.chi2.1 > LEFT_OVER_CHI2 && excess_us2 > LEFT_OVER_US * LEFT_OVER_US
-        })
+        self.rungs.as_ref().filter(|rungs| keeps_more(rungs))
     }
+}
+
+/// Whether more is left than noise and air would leave.
+fn keeps_more(left: &Shrink) -> bool {
+    let excess_us2 = left.after_without_air_us.powi(2) - left.floor_us.powi(2);
+    left.chi2.1 > LEFT_OVER_CHI2 && excess_us2 > LEFT_OVER_US * LEFT_OVER_US
 }
 
 /// A gap before and after, root mean squares.

@@ -53,6 +53,13 @@ pub enum Warning {
         /// Whether it may be the wind's own.
         in_strong_wind: bool,
     },
+    /// Held-out drones keep more than noise and air would leave, held-out rungs do not.
+    DronesDiffer {
+        /// Root mean square that is left on those drones, us.
+        left_us: f64,
+        /// Root mean square that noise and air alone would leave there, us.
+        floor_us: f64,
+    },
     /// Tables were compared, which have no plan.
     Tables,
     /// All drones climb at the same time.
@@ -121,6 +128,12 @@ impl fmt::Display for Warning {
                      for it"
                 })
             }
+            Self::DronesDiffer { left_us, floor_us } => write!(
+                f,
+                "on drones that were held out {left_us:.1} us are left where noise and air alone would leave \
+                 {floor_us:.1}, and on rungs that were held out no more than that: single drones answer the \
+                 climb differently, which one model of all cannot have"
+            ),
             Self::Tables => f.write_str(
                 "tables have no plan that could be flown again: the model's side is its closed forms at \
                  the climb that was flown",
@@ -152,6 +165,10 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
             reduced_chi2: rungs.chi2.1,
             in_strong_wind: is_strong_wind(found.comparison.wind.mean_mps),
         });
+    }
+    if let Some(drones) = gap.drones_differ() {
+        let (left_us, floor_us) = (drones.after_without_air_us, drones.floor_us);
+        warnings.push(Warning::DronesDiffer { left_us, floor_us });
     }
     let drones = data.drones();
     if drones == 1 {

@@ -5,15 +5,19 @@ use std::path::{Component, Path, PathBuf};
 
 use rayon::prelude::*;
 
-use crate::base::digest::sha256;
+use crate::base::digest::{sha256, sha256_of_files};
 use crate::base::file::{FileError, read_whole};
 use crate::blind::game::{FileDigest, GameFile};
 use crate::blind::play;
 use crate::campaign::FlightFolder;
 use crate::campaign::origin::logs_in;
+use crate::gap::Verdict;
 
 /// Largest file of a flight that is read, bytes.
 const MAX_BYTES: u64 = 1 << 30;
+
+/// Folder of the logs, below the game's folder.
+const LOGS: &str = "flight/logs";
 
 /// A file that is not as it was flown.
 pub(super) struct Difference {
@@ -48,6 +52,18 @@ pub(super) fn digests(folder: &Path) -> Result<Vec<FileDigest>, FileError> {
         Ok(FileDigest { path: name_of(folder, path), sha256 })
     };
     present(folder).par_iter().map(of).collect()
+}
+
+/// Why a verdict is none on the logs of this game, as the rest of a sentence that begins with the verdict; `None`: it is.
+pub(super) fn stranger(game: &GameFile, verdict: &Verdict) -> Option<String> {
+    let is_log = |file: &&FileDigest| Path::new(&file.path).starts_with(LOGS);
+    let logs = game.files.iter().filter(is_log).map(|file| file.sha256.as_str());
+    let compared = &verdict.data.logs_sha256;
+    if compared.is_empty() {
+        return Some("does not say which logs were compared".to_owned());
+    }
+    (*compared != sha256_of_files(logs))
+        .then(|| "is of other logs than those of this game".to_owned())
 }
 
 /// Files that were changed, removed or added since the flight.

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{files, game_path, record_path};
+use super::{files, game_path};
 use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::plain::Shown as _;
 use crate::blind::game::{GAME_SCHEMA, Game, GameFile};
-use crate::blind::{BlindError, fly, play, seal};
+use crate::blind::{BlindError, fly, play, record, seal};
 use crate::campaign::{self, CAMPAIGN_SCHEMA, CampaignIndex, index_path, to_json};
 use crate::workflow::ending::Ending;
 use crate::workflow::error::WorkflowError;
@@ -151,7 +151,7 @@ fn make_room(folder: &Path, force: bool) -> Result<(), WorkflowError> {
         let gap = folder.join("gap");
         removed(&gap, std::fs::remove_dir_all(&gap))?;
         play::remove(folder)?;
-        for path in [record_path(folder), index_path(folder), game_path(folder)] {
+        for path in [record::path(folder), index_path(folder), game_path(folder)] {
             removed(&path, std::fs::remove_file(&path))?;
         }
         return Ok(());

@@ -19,17 +19,10 @@ use crate::campaign::read_json;
 
 /// Name of what the player is given.
 const GAME: &str = "game.json";
-/// Name of the record of an opened seal.
-const RECORD: &str = "reveal.json";
 
 /// Path of the file that makes a folder a game.
 pub(crate) fn game_path(folder: &Path) -> PathBuf {
     folder.join(GAME)
-}
-
-/// Path of the record of an opened seal.
-pub(crate) fn record_path(folder: &Path) -> PathBuf {
-    folder.join(RECORD)
 }
 
 /// What the player was given.

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{files, game_path, read_game, record_path, verify};
+use super::{files, game_path, read_game, verify};
 use crate::base::digest::sha256;
 use crate::base::file::{read_whole, write_whole};
 use crate::base::plain::Shown as _;
 use crate::blind::explain::Explain as _;
-use crate::blind::record::{BlindRecord, Parts, RECORD_SCHEMA};
+use crate::blind::record::{self, BlindRecord, Parts, RECORD_SCHEMA};
 use crate::blind::{BlindError, play, seal};
 use crate::campaign::{FlightFolder, read_json};
 use crate::workflow::error::WorkflowError;
@@ -38,11 +38,19 @@ pub fn run(
 ) -> Result<(BlindRecord, PathBuf), WorkflowError> {
     let game = read_game(folder)?;
     let _lock = host.lock(folder)?;
-    let path = record_path(folder);
+    let path = record::path(folder);
     let compared = gap.map_or_else(|| gap_folder(folder), Path::to_owned);
     let verdict_path = compared.join(VERDICT);
     let again = proof::again(folder, None, gap);
     if !verdict_path.is_file() {
+        if path.exists() {
+            return Err(WorkflowError::Nothing(format!(
+                "the seal was opened before ({}), and {} has no {VERDICT} now; put it back, or say where \
+                 it is (--gap)",
+                path.shown(),
+                compared.shown()
+            )));
+        }
         return Err(WorkflowError::Nothing(format!(
             "the truth stays sealed: {} has no {VERDICT}; compare first (`{again}`), or say where that was \
              put (--gap)",
@@ -64,11 +72,22 @@ pub fn run(
         )));
     }
     let flight = FlightFolder::at(&play::flight(folder));
-    is_of(&proven.verdict, &flight.read_plan()?).map_err(|why| {
-        WorkflowError::Usage(format!("{} cannot be used: {why}", verdict_path.shown()))
-    })?;
+    let plan = flight.read_plan()?;
+    let why =
+        files::stranger(&game, &proven.verdict).or_else(|| is_of(&proven.verdict, &plan).err());
+    if let Some(why) = why {
+        return Err(WorkflowError::Usage(format!(
+            "the truth stays sealed: {} {why}; compare this game (`{again}`)",
+            verdict_path.shown()
+        )));
+    }
+    if !seal::truth_path(folder).exists() {
+        return Err(WorkflowError::Nothing(format!(
+            "the truth is not here: {} is missing; whoever kept it from the player must put it back",
+            seal::truth_path(folder).shown()
+        )));
+    }
     let opened = seal::open(folder, &verdict_path, Some(&game.truth_sha256))?;
-    host.say(&format!("Seal opened: it hides {}", opened.truth.words()));
     let fisher_z = Searched.fisher_z(&flight.0, &opened.truth);
     let record = BlindRecord::of(&Parts {
         made_by: &made_by(),
@@ -79,6 +98,8 @@ pub fn run(
         fisher_z: &fisher_z,
     })?;
     write_whole(&path, &record.to_json()?)?;
+    // Only now: who has read the truth without a record could ask for a second verdict.
+    host.say(&format!("Seal opened: it hides {}", opened.truth.words()));
     Ok((record, path))
 }
 

@@ -6,18 +6,21 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::reveal::{MAX_GAME_BYTES, gap_folder, read_record};
-use super::{files, game_path, read_game, record_path};
+use super::{files, game_path, read_game};
 use crate::base::digest::sha256;
 use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
 use crate::blind::game::GameFile;
-use crate::blind::record::BlindRecord;
+use crate::blind::record::{self, BlindRecord};
 use crate::blind::seal;
 use crate::campaign::CampaignError;
 use crate::gap::Verdict;
 use crate::workflow::error::{WorkflowError, with_reasons};
 use crate::workflow::gap::{VERDICT, proof};
 use crate::workflow::{made_by, words};
+
+/// What is wrong with a sealed file that is not there.
+const AWAY: &str = "is missing (put the folder back if it was kept from the player)";
 
 /// Name and version of the format of what `updraft blind verify --json` prints.
 pub const VERIFY_SCHEMA: &str = "updraft.blind-verify/1";
@@ -86,7 +89,7 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
         ) => (None, Some(with_reasons(&error))),
         Err(error) => return Err(error),
     };
-    let path = record_path(folder);
+    let path = record::path(folder);
     let revealed = path.exists();
     let record = revealed.then(|| read_record(&path));
     let (record, unreadable) = match record {
@@ -97,8 +100,8 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
     let recorded = record.as_ref().map(|record| record.truth_sha256.clone());
     let published = published.map(str::to_lowercase);
     let given = || game.as_ref().map(|game| game.truth_sha256.clone());
-    let beside = || seal::published(folder).unwrap_or_default();
-    let truth_sha256 = published.or(recorded).or_else(given).unwrap_or_else(beside);
+    let beside = seal::published(folder).ok();
+    let truth_sha256 = published.unwrap_or_else(|| most_told([recorded, given(), beside]));
     let mut checks = Checks { folder, made: Vec::new() };
     checks.seal(&truth_sha256);
     if let Some(game) = &game {
@@ -108,7 +111,7 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
     if let Some(problem) = damage {
         checks.add(&game_path(folder), "", Some(problem));
     }
-    let proven = checks.verdict(record.as_ref(), revealed);
+    let proven = checks.verdict(record.as_ref(), game.as_ref(), revealed);
     if let Some(problem) = unreadable {
         checks.add(&path, "", Some(problem));
     }
@@ -125,6 +128,15 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
     })
 }
 
+/// The hash that most of the files tell, where they differ the first that is told: one file of another game makes
+/// no stranger of the others.
+fn most_told(told: [Option<String>; 3]) -> String {
+    let told: Vec<String> = told.into_iter().flatten().collect();
+    let count = |hash: &String| told.iter().filter(|other| *other == hash).count();
+    // The last of several maxima is taken.
+    told.iter().rev().max_by_key(|hash| count(hash)).cloned().unwrap_or_default()
+}
+
 /// What is wrong with a hash, if it is another.
 fn other(found: &str, wanted: &str) -> Option<String> {
     (found != wanted)
@@ -136,12 +148,14 @@ impl Checks<'_> {
     fn seal(&mut self, truth_sha256: &str) {
         let folder = self.folder;
         let problem = match seal::truth_sha256(folder) {
+            _ if !seal::truth_path(folder).exists() => Some(AWAY.to_owned()),
             Ok(found) => other(&found, truth_sha256),
             Err(error) => Some(with_reasons(&error)),
         };
         let holds = "the truth and its nonce have the SHA-256 that was published";
         self.add(&seal::truth_path(folder), holds, problem);
         let problem = match seal::published(folder) {
+            _ if !seal::hash_path(folder).exists() => Some(AWAY.to_owned()),
             Ok(found) if found == truth_sha256 => None,
             Ok(found) => Some(format!("says {found}, published was {truth_sha256}")),
             Err(error) => Some(with_reasons(&error)),
@@ -183,7 +197,12 @@ impl Checks<'_> {
     }
 
     /// The verdict, if there is one yet.
-    fn verdict(&mut self, record: Option<&BlindRecord>, revealed: bool) -> Option<Verdict> {
+    fn verdict(
+        &mut self,
+        record: Option<&BlindRecord>,
+        game: Option<&GameFile>,
+        revealed: bool,
+    ) -> Option<Verdict> {
         let compared = match record {
             Some(record) => self.folder.join(&record.gap),
             None => gap_folder(self.folder),
@@ -209,12 +228,15 @@ impl Checks<'_> {
         }
         match proof::read(&compared, &again) {
             Ok(proven) => {
+                // What the seal was opened for was held against the flight then.
+                let game = game.filter(|_| record.is_none());
+                let why = game.and_then(|game| files::stranger(game, &proven.verdict));
                 let holds = if record.is_some() {
                     "is the one for which the seal was opened"
                 } else {
                     "is as `updraft gap` wrote it"
                 };
-                self.add(&path, holds, None);
+                self.add(&path, holds, why);
                 Some(proven.verdict)
             }
             Err(error) => {

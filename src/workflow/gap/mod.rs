@@ -16,8 +16,10 @@ use super::error::WorkflowError;
 use super::find::{Found, Work};
 use super::host::Host;
 use super::provenance::provenance;
+use crate::base::digest::sha256_of_files;
 use crate::base::file::{create_folder, write_whole};
 use crate::base::plain::Shown as _;
+use crate::blind::record;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::to_json;
 use crate::effects::select::resolved;
@@ -103,11 +105,19 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
     let work = Work { flights: vec![found], ..Work::new(&root) };
     let provenance =
         Provenance { seed: Some(request.options.seed), ..provenance(host, &work, settings) };
+    explained.verdict.data.logs_sha256 = logs_sha256(&work)?;
     let page = write(&folder, &explained, &provenance)?;
     for reason in &explained.verdict.data.left_out {
         host.warn(&reason.to_string());
     }
     Ok(Compared { verdict: explained.verdict, model: folder.join(MODEL), page })
+}
+
+/// SHA-256 of the logs that were compared, by which a verdict is known as theirs.
+fn logs_sha256(work: &Work) -> Result<String, WorkflowError> {
+    let logs = work.flights.iter().flat_map(|flight| &flight.logs);
+    let hashes = logs.map(|log| work.hashes.sha256(&log.path)).collect::<Result<Vec<_>, _>>()?;
+    Ok(sha256_of_files(hashes.iter().map(String::as_str)))
 }
 
 /// The folder of the results, if it may be written into.
@@ -121,6 +131,16 @@ fn output(request: &Request) -> Result<PathBuf, WorkflowError> {
         return Err(WorkflowError::Failed(format!(
             "{} is a file: --output must name a folder",
             folder.shown()
+        )));
+    }
+    if let Some(game) = &request.campaign
+        && record::path(game).exists()
+        && folder.join(VERDICT).exists()
+    {
+        return Err(WorkflowError::Usage(format!(
+            "{} is the verdict of a game whose seal was opened, and who knows the truth cannot be asked again; \
+             to compare all the same, choose another folder with -o",
+            folder.join(VERDICT).shown()
         )));
     }
     if request.output.is_some() {

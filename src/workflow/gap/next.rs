@@ -174,7 +174,10 @@ impl Before {
         let Proven { verdict, .. } = proof::read(&compared, &again)?;
         let (folder, plan) = flight_of(campaign, wish.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
-            WorkflowError::Usage(format!("{} cannot be used: {why}", place.shown()))
+            WorkflowError::Usage(format!(
+                "{} {why}; name the flight that was compared (--flight), or compare this one (`{again}`)",
+                place.shown()
+            ))
         })?;
         let vehicle = folder.vehicle();
         let model = compared.join(MODEL);
@@ -186,21 +189,20 @@ impl Before {
     }
 }
 
-/// Whether a verdict can be one of this flight; else why not.
+/// Whether a verdict can be one of this flight; else why not, as the rest of a sentence that begins with the verdict.
 pub(crate) fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
     if verdict.schema != VERDICT_SCHEMA {
-        return Err(format!("its schema is \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
+        return Err(format!("has the schema \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
     }
     let names = |group: &(String, usize)| plan.groups.iter().any(|known| known.name == group.0);
     let stranger = verdict.data.groups.iter().find(|group| !names(group));
     match stranger {
         Some((name, _)) => Err(format!(
-            "it compares a group \"{name}\", which the flight {} does not have: name the flight that \
-             was compared (--flight)",
+            "compares a group \"{name}\", which the flight {} does not have",
             plan.name
         )),
         None if verdict.data.drones > plan.slots.len() => Err(format!(
-            "it compares {} drones, and the flight {} has {}",
+            "compares {} drones, and the flight {} has {}",
             verdict.data.drones,
             plan.name,
             plan.slots.len()

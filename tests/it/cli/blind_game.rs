@@ -3,9 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
 
 use std::fs;
+use std::path::Path;
 
 use super::support::{Bench, Ended, contents};
 use crate::gap::verdicts::{fitted, prove, verdict};
+use updraft::base::digest::sha256;
 use updraft::gap::Verdict;
 use updraft::gap::verdict::Finding;
 
@@ -26,8 +28,23 @@ fn naming(effect: &str, parameter: &str, value: f64) -> Verdict {
     verdict
 }
 
-/// As if `updraft gap` had compared.
+/// As if `updraft gap game` had compared.
 fn compare(bench: &Bench, folder: &str, verdict: &Verdict) {
+    let beside = Path::new(folder).parent().map(|of| of.join("game.json"));
+    let beside = beside.map(|path| path.to_string_lossy().into_owned());
+    let at = beside.filter(|path| bench.path(path).exists());
+    let game = fs::read(bench.path(at.as_deref().unwrap_or("game/game.json"))).unwrap();
+    let game: serde_json::Value = serde_json::from_slice(&game).unwrap();
+    let files = game["files"].as_array().unwrap().iter();
+    let logs = files.filter(|file| file["path"].as_str().unwrap().ends_with(".BIN"));
+    let mut hashes: Vec<&str> = logs.map(|file| file["sha256"].as_str().unwrap()).collect();
+    hashes.sort_unstable();
+    let mut verdict = verdict.clone();
+    verdict.data.logs_sha256 = sha256(hashes.join("\n").as_bytes());
+    write(bench, folder, &verdict);
+}
+
+fn write(bench: &Bench, folder: &str, verdict: &Verdict) {
     let folder = bench.path(folder);
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("verdict.json"), serde_json::to_vec(verdict).unwrap()).unwrap();
@@ -53,8 +70,8 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     );
     let game: serde_json::Value =
         serde_json::from_slice(&fs::read(bench.path("game/game.json")).unwrap()).unwrap();
-    let sha256 = game["truth_sha256"].as_str().unwrap();
-    assert!(hidden.out.contains(sha256) && hidden.out.contains("updraft gap game"), "{hidden}");
+    let published = game["truth_sha256"].as_str().unwrap();
+    assert!(hidden.out.contains(published) && hidden.out.contains("updraft gap game"), "{hidden}");
     // Neither what is said nor what the player is given tells what is hidden.
     let told = format!("{hidden}{game}");
     assert!(!told.contains("battery"), "{told}");
@@ -71,11 +88,41 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
         "{early}"
     );
     assert!(!early.err.contains("battery") && !bench.path("game/reveal.json").exists());
-    let before = bench.expect(0, &["blind", "verify", "game", "--sha256", sha256]);
+    let before = bench.expect(0, &["blind", "verify", "game", "--sha256", published]);
     assert!(before.out.contains("The seal was not opened yet"), "{before}");
     assert!(!before.out.contains("battery"), "{before}");
 
+    // The verdict of another game, and one that does not say of which logs it is, prove nothing of this.
+    hide(&bench, &[&FEW[..], &["--nothing", "--seed", "8", "-o", "other"]].concat());
+    let mut stranger = naming("battery", "exponent", 0.7);
+    for (logs_sha256, said) in [
+        (
+            "ab".repeat(32),
+            "the truth stays sealed: game/gap/verdict.json is of other logs than those of this game",
+        ),
+        (
+            String::new(),
+            "the truth stays sealed: game/gap/verdict.json does not say which logs were compared",
+        ),
+    ] {
+        stranger.data.logs_sha256 = logs_sha256;
+        write(&bench, "game/gap", &stranger);
+        let ended = bench.expect(2, &["blind", "reveal", "game"]);
+        assert!(ended.err.contains(said) && !ended.out.contains("Hidden"), "{ended}");
+        let ended = bench.expect(4, &["blind", "verify", "game"]);
+        assert!(ended.out.contains("WRONG  game/gap/verdict.json"), "{ended}");
+    }
     compare(&bench, "game/gap", &naming("battery", "exponent", 0.72));
+    // The truth was kept from the player, and nobody has put it back.
+    fs::rename(bench.path("game/sealed"), bench.path("away")).unwrap();
+    let ended = bench.expect(5, &["blind", "reveal", "game"]);
+    assert!(
+        ended.err.contains("the truth is not here: game/sealed/truth.json is missing"),
+        "{ended}"
+    );
+    let ended = bench.expect(4, &["blind", "verify", "game"]);
+    assert!(ended.out.contains("truth.json: is missing (put the folder back"), "{ended}");
+    fs::rename(bench.path("away"), bench.path("game/sealed")).unwrap();
     // What was changed before the seal is opened keeps it closed.
     let log = bench.path("game/flight/logs/02.BIN");
     let flown = fs::read(&log).unwrap();
@@ -104,11 +151,16 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     for (file, from, to, said) in [
         ("sealed/truth.json", "battery", "buttery", "truth.json: was altered: its SHA-256 is"),
         ("sealed/truth.json", "\"nonce\": \"", "\"nonce\": \"0", "truth.json: was altered"),
-        ("sealed/SHA256", &sha256[..8], "01234567", "SHA256: says 01234567"),
+        ("sealed/SHA256", &published[..8], "01234567", "SHA256: says 01234567"),
         ("game.json", "still", "calm", "game.json: was altered: its SHA-256 is"),
         ("game.json", "\"still\"", "", "game.json"),
         ("game.json", "blind-game/1", "blind-game/9", "updraft.blind-game/9"),
-        ("game.json", &sha256[..8], "01234567", "game.json: says that the truth's SHA-256 is 0123"),
+        (
+            "game.json",
+            &published[..8],
+            "01234567",
+            "game.json: says that the truth's SHA-256 is 0123",
+        ),
         ("gap/verdict.json", "battery", "buttery", "verdict.json: was altered: its SHA-256 is"),
         ("gap/SHA256", "verdict", "verdikt", "verdict.json was edited after"),
         ("flight/plan.json", "{", "{ ", "plan.json: was changed after the flight"),
@@ -148,7 +200,33 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     fs::write(bench.path("game/flight/plan.json"), before).unwrap();
     bench.expect(0, &["blind", "reveal", "game"]);
 
-    // Who knows the truth is not asked again.
+    // The record of another game blames itself alone.
+    let record = fs::read(bench.path("game/reveal.json")).unwrap();
+    let verdict_of_this = fs::read(bench.path("game/gap/verdict.json")).unwrap();
+    fs::remove_dir_all(bench.path("other")).unwrap();
+    fs::rename(bench.path("game"), bench.path("other")).unwrap();
+    hide(&bench, &[&FEW[..], &["--nothing", "--seed", "9", "-o", "game"]].concat());
+    compare(&bench, "game/gap", &naming("battery", "exponent", 0.72));
+    fs::write(bench.path("game/reveal.json"), &record).unwrap();
+    let ended = bench.expect(4, &["blind", "verify", "game"]);
+    assert!(
+        ended.out.contains("WRONG  game/reveal.json: is of a truth with the SHA-256"),
+        "{ended}"
+    );
+    assert!(ended.out.contains("ok     game/sealed/truth.json"), "{ended}");
+    fs::remove_dir_all(bench.path("game")).unwrap();
+    fs::rename(bench.path("other"), bench.path("game")).unwrap();
+
+    // Who knows the truth is not asked again, neither here nor by the search.
+    let ended = bench.expect(2, &["gap", "game"]);
+    assert!(
+        ended.err.contains("game/gap/verdict.json is the verdict of a game whose seal was opened"),
+        "{ended}"
+    );
+    assert_eq!(fs::read(bench.path("game/gap/verdict.json")).unwrap(), verdict_of_this);
+    fs::rename(bench.path("game/gap/verdict.json"), bench.path("kept")).unwrap();
+    let ended = bench.expect(5, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("the seal was opened before (game/reveal.json)"), "{ended}");
     compare(&bench, "game/gap", &naming("rotor-inflow", "inflow_share", 0.3));
     let ended = bench.expect(2, &["blind", "reveal", "game"]);
     assert!(ended.err.contains("the seal was opened for another verdict"), "{ended}");

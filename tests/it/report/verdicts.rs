@@ -163,6 +163,7 @@ pub(crate) fn nothing() -> Verdict {
         summary: String::new(),
         data: DataUsed {
             logs: 9,
+            logs_sha256: String::new(),
             drones: 8,
             groups: vec![("even".to_owned(), 4), ("odd".to_owned(), 4)],
             bins: vec![146, 145],
