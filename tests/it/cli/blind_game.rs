@@ -36,7 +36,7 @@ fn compare(bench: &Bench, folder: &str, verdict: &Verdict) {
     let game = fs::read(bench.path(at.as_deref().unwrap_or("game/game.json"))).unwrap();
     let game: serde_json::Value = serde_json::from_slice(&game).unwrap();
     let files = game["files"].as_array().unwrap().iter();
-    let logs = files.filter(|file| file["path"].as_str().unwrap().ends_with(".BIN"));
+    let logs = files.filter(|file| file["path"].as_str().unwrap().starts_with("flight/logs/"));
     let mut hashes: Vec<&str> = logs.map(|file| file["sha256"].as_str().unwrap()).collect();
     hashes.sort_unstable();
     let mut verdict = verdict.clone();
