@@ -115,10 +115,35 @@ impl Record {
         covariance
     }
 
+    /// Generalized least squares in air with a given covariance between windows, (m/s)².
+    pub(super) fn fit_in(&self, air: impl Fn(usize, usize) -> f64, white_us: f64) -> Option<Gls> {
+        let n = self.noise_us.len();
+        let mut covariance = DMatrix::zeros(n, n);
+        for row in 0..n {
+            for column in 0..=row {
+                let mut value = self.sensitivity[row] * self.sensitivity[column];
+                if value != 0.0 && row < self.windows {
+                    value *= air(row, column);
+                }
+                if row == column {
+                    let white = if row < self.windows { white_us } else { 0.0 };
+                    value += self.noise_us[row].powi(2) + white * white;
+                }
+                covariance[(row, column)] = value;
+                covariance[(column, row)] = value;
+            }
+        }
+        self.with_doubts(covariance)
+    }
+
     /// Generalized least squares with one choice of the scales; `None` if the windows do not
     /// determine the law.
     pub(super) fn fit(&self, air: &Air) -> Option<Gls> {
-        let mut covariance = self.covariance(air);
+        self.with_doubts(self.covariance(air))
+    }
+
+    /// The fit, with a likelihood that takes no doubted drift for air.
+    fn with_doubts(&self, mut covariance: DMatrix<f64>) -> Option<Gls> {
         let fit = self.solve(covariance.clone())?;
         if self.doubts_us.is_empty() {
             return Some(fit);

@@ -14,11 +14,13 @@ use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
 use super::input::{FlightInput, LogInput, TruthSeries};
+use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf};
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
+use super::posterior;
 use super::prefer::{better_law, chosen, describes, vertex_mps};
 use super::refer::refer_calibration;
 use super::reference::same_drone;
@@ -264,9 +266,17 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         let most = most.filter(|_| shared.planned_purpose.is_none());
         warnings.extend(most.map(|(up, down)| Warning::NoLadder { up, down }));
     }
-    let map = (!measured.is_empty()).then(|| map(measured, shared));
+    let (mut map, modelled) = (!measured.is_empty()).then(|| map(measured, shared)).unzip();
     warnings.extend(map.iter().flat_map(|map| map_warnings(shared, map)));
     let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
+    if let Some((map, modelled)) = map.as_mut().zip(modelled) {
+        posterior::add(
+            map,
+            modelled,
+            shared,
+            statistics.as_ref().and_then(|found| found.wind.as_ref()),
+        );
+    }
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -495,7 +505,8 @@ fn law_reason(shared: &Shared<'_>) -> Option<String> {
 type NamedUpdraft =
     (Option<u16>, String, Option<[f64; 2]>, DroneSeries, LawOf, Option<TruthSeries>);
 
-fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
+/// The map, and its drones' values as the model of the air sees them.
+fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Option<Drone>>) {
     let uniform_mps = shared.input.true_updraft_mps;
     let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
     let times = updraft::common_times(&series);
@@ -533,9 +544,17 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
                 .map_or_else(Vec::new, |one| series.spread(&one.interval_mps, &times)),
             quality: series.measured.as_ref().map_or_else(Vec::new, |one| one.quality.clone()),
             truth_mps: truth_of(slot, truth),
+            posterior_mps: Vec::new(),
+            posterior_sd_mps: Vec::new(),
+            posterior_mean: None,
         })
         .collect();
-    UpdraftMap {
+    let modelled = series
+        .iter()
+        .zip(&drones)
+        .map(|(series, drone)| posterior::seen(series, drone.position_m, &drone.track_m, &times))
+        .collect();
+    let map = UpdraftMap {
         law: shared.map_law.unwrap_or(LawKind::Linear),
         law_reason: law_reason(shared),
         wind: match (shared.input.leaning, shared.input.lean_table) {
@@ -553,5 +572,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         common: aware.map(|aware| aware.common(&measured)),
         truth: truth::check(&drones),
         drones,
-    }
+        posterior: None,
+    };
+    (map, modelled)
 }

@@ -10,6 +10,7 @@ use super::budget::{BatteryCorrection, CommonError, ErrorBudget, Quality, Qualit
 use super::cause::Cause;
 use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WIND};
 use super::hover::{Hover, Second};
+use super::kriging::Value;
 use super::law::LawKind;
 use super::measured::Measured;
 use super::reference::same_drone;
@@ -49,6 +50,11 @@ const CLIMB_STEP: f64 = 0.6;
 const LEAST_STEEPER: f64 = 0.7;
 /// See [`LEAST_STEEPER`].
 const MOST_STEEPER: f64 = 2.0;
+/// Below this air velocity the slope of a signed quadratic is too flat to carry errors; this velocity's slope stands
+/// in, m/s. Chosen: gusts of a drone on a calm day.
+const STEEP_MPS: f64 = 0.15;
+/// A slope is not taken for worse known than by this share of it. Numerical.
+const MOST_SLOPE_SHARE: f64 = 0.5;
 /// Air further out than the ladder by this is marked, m/s: one rung.
 const BEYOND_MPS: f64 = 0.5;
 
@@ -79,6 +85,17 @@ impl<'a> Aware<'a> {
             Shape::Line => LawKind::Linear,
             Shape::SignedQuadratic => LawKind::SignedQuadratic,
         }
+    }
+
+    /// Pulse per vertical air speed of the drones' lines, us/(m/s).
+    pub(super) fn slope(&self) -> f64 {
+        self.slope
+    }
+
+    /// Places of the calibration's drones on the level, show frame, m.
+    pub(super) fn homes_m(&self) -> Vec<[f64; 2]> {
+        let counted = self.reference.drones.iter().filter(|drone| counts(self.reference, drone));
+        counted.filter_map(|drone| drone.home_m).collect()
     }
 
     /// Why that law, in one phrase.
@@ -225,12 +242,23 @@ impl<'a> Aware<'a> {
         sigmas: &[f64; DOUBTS],
     ) -> Vec<(Referred, f64)> {
         let mut known: Vec<(Referred, f64)> = Vec::new();
+        let airs = referred.iter().flatten().filter_map(|(one, _)| values.air_mps(one.pulse_us));
+        // Errors of the law at one speed: a slope that followed the values would shrink them until they looked calm.
+        let middle_mps = mean(airs).unwrap_or_default();
+        measured.slope_share = values.slope_share(middle_mps);
+        // What wind does beyond its correction is told by no flutter of the lean, which a drone's inertia delays: its
+        // doubt is one constant.
+        let steady = |doubt: usize| {
+            mean(referred.iter().flatten().map(|(one, _)| one.doubts_us[doubt])).unwrap_or_default()
+        };
+        let steady_us = [WIND, DENSITY].map(|doubt| (doubt, steady(doubt)));
         for one in referred {
             let found = one.and_then(|(one, _)| Some((one, values.air_mps(one.pulse_us)?)));
             let Some((one, air_mps)) = found else {
                 measured.updraft_mps.push(None);
                 measured.sd_mps.push(None);
                 measured.interval_mps.push(None);
+                measured.modelled.push(None);
                 continue;
             };
             known.push((one, air_mps));
@@ -239,6 +267,17 @@ impl<'a> Aware<'a> {
             let half_us = error.half_us(self.zero.width, noise_us);
             let interval = values.interval(&one, values.level_us(&one, air_mps, half_us));
             let noise = values.interval(&one, values.level_us(&one, air_mps, NORMAL * noise_us));
+            let mut doubts_us = one.doubts_us;
+            steady_us.iter().for_each(|(doubt, value)| doubts_us[*doubt] = *value);
+            let middle = values.error(&doubts_us, middle_mps, sigmas);
+            let per_mps = values.steep(&one, middle_mps);
+            measured.modelled.push(Some(Value {
+                updraft_mps: one.velocity_mps - air_mps,
+                law: middle.basis.map(|basis| -basis / per_mps),
+                doubts_mps: middle.doubts_us.map(|doubt| -doubt / per_mps),
+                own_mps: middle.own_us2.sqrt() / per_mps,
+                noise_mps: noise_us / values.steep(&one, air_mps),
+            }));
             measured.updraft_mps.push(Some(one.velocity_mps - air_mps));
             measured.interval_mps.push(interval);
             measured.sd_mps.push(noise.map(|[low, high]| (high - low) / (2.0 * NORMAL)));
@@ -439,6 +478,7 @@ fn point(
         drone,
         key,
         time_s: f64::midpoint(window.start_s, window.end_s),
+        height_m: window.height_m,
         velocity_mps: referred.velocity_mps,
         pulse_us: referred.pulse_us,
         noise_us: window.effort_phi.se.hypot(slope * window.velocity_mps.se),
@@ -531,6 +571,38 @@ impl Values<'_> {
             own_us2: own_us2.max(0.0),
             doubts_us,
         }
+    }
+
+    /// Standard error of the law's slope as a share of it.
+    fn slope_share(&self, air_mps: f64) -> f64 {
+        let by: [f64; PARAMETERS] = match self.shape {
+            Shape::Line => [0.0, 1.0, 2.0 * air_mps, 2.0 * air_mps.abs()],
+            Shape::SignedQuadratic => [0.0, 2.0 * air_mps.abs(), 0.0, 0.0],
+        };
+        let mut own = 0.0;
+        for row in 0..PARAMETERS {
+            for column in 0..PARAMETERS {
+                own += by[row] * self.law.own[(row, column)] * by[column];
+            }
+        }
+        let slope = self.slope(air_mps);
+        let share = (self.common_us2(&by) + own.max(0.0)).sqrt() / slope;
+        if slope > 0.0 && share.is_finite() { share.min(MOST_SLOPE_SHARE) } else { 0.0 }
+    }
+
+    /// Pulse per vertical air speed where a value was made, us/(m/s): never as flat as a signed quadratic
+    /// is in hover, through which no error could be carried by its slope.
+    fn steep(&self, one: &Referred, air_mps: f64) -> f64 {
+        let steep = if self.shape == Shape::SignedQuadratic {
+            air_mps.abs().max(STEEP_MPS)
+        } else {
+            air_mps
+        };
+        let slope = self.slope(steep);
+        if slope <= 0.0 {
+            return TYPICAL_SLOPE;
+        }
+        slope * (1.0 + one.steeper / slope).clamp(LEAST_STEEPER, MOST_STEEPER)
     }
 
     /// What a change of the pulse is at level flight without wind, us: where wind makes the pulse

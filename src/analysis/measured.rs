@@ -2,6 +2,7 @@
 
 use super::budget::{ErrorBudget, QualityFlag};
 use super::corrections::DOUBTS;
+use super::kriging::Value;
 use super::shape::PARAMETERS;
 
 /// What one drone's hover gave.
@@ -11,6 +12,10 @@ pub(super) struct Measured {
     pub(super) updraft_mps: Vec<Option<f64>>,
     pub(super) sd_mps: Vec<Option<f64>>,
     pub(super) interval_mps: Vec<Option<[f64; 2]>>,
+    /// The values with what they hang on.
+    pub(super) modelled: Vec<Option<Value>>,
+    /// Standard error of the law's slope as a share of it.
+    pub(super) slope_share: f64,
     pub(super) mean_mps: f64,
     pub(super) mean_interval_mps: [f64; 2],
     pub(super) errors: ErrorBudget,

@@ -286,6 +286,77 @@ pub struct UpdraftMap {
     /// Comparison with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+    /// The map as one estimate of all drones, seconds and the calibration together; absent: too few values, or
+    /// drones without places or errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub posterior: Option<PosteriorMap>,
+}
+
+/// What all values of a flight say together: a uniform updraft, a Gaussian field that may drift with the wind,
+/// gusts of each drone's own, and what is not known well of the drones' laws
+/// ([`DroneUpdraft::posterior_mps`] has the values).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PosteriorMap {
+    /// Mean over all drones and seconds, m/s, up positive.
+    pub fleet: Option<Estimate>,
+    /// The air where the plan has a drone and the flight has no values.
+    #[serde(default)]
+    pub filled: Vec<FilledDrone>,
+    /// Scales of the air; absent: no stationary field describes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scales: Option<AirScales>,
+    /// Why there are no scales.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_scales: Option<String>,
+    /// What the flight itself and the air's scales add to the values that the calibration's law alone gives, m/s:
+    /// the mean over all.
+    pub zero_shift_mps: f64,
+    /// Probability that there is an updraft which is everywhere and always the same.
+    pub uniform_probability: f64,
+    /// Comparison of the posterior with the true air, when it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthCheck>,
+}
+
+/// The air at a place of the plan without values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FilledDrone {
+    /// Slot number.
+    pub slot: u16,
+    /// Place in the show frame, m (x forward, y left).
+    pub position_m: [f64; 2],
+    /// Posterior mean at each of [`UpdraftMap::time_s`], m/s, up positive.
+    pub posterior_mps: Vec<Option<f64>>,
+    /// Its standard deviation, m/s.
+    pub posterior_sd_mps: Vec<Option<f64>>,
+}
+
+/// Scales of the air by the likelihood of all values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AirScales {
+    /// How the correlation falls with distance and time: `exponential` or `Gaussian`.
+    pub form: String,
+    /// Standard deviation of the field, m/s.
+    pub sd_mps: f64,
+    /// Distance at which the field's correlation has fallen to 1/e, m.
+    pub length_m: PosteriorScale,
+    /// Time after which it has, for who drifts along, s.
+    pub time_s: PosteriorScale,
+    /// How fast the field drifts, along show x (forward) and y (left), m/s.
+    pub drift_mps: [f64; 2],
+    /// Standard deviation of each drone's own gusts, m/s.
+    pub gust_mps: f64,
+    /// Their time scale, s.
+    pub gust_s: f64,
+}
+
+/// A scale with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PosteriorScale {
+    /// Most probable value.
+    pub value: f64,
+    /// 95 % interval.
+    pub interval: [f64; 2],
 }
 
 /// By what the wind on leaning drones was corrected for.
@@ -349,6 +420,16 @@ pub struct DroneUpdraft {
     /// included, m/s; empty: not known.
     #[serde(default)]
     pub interval_mps: Vec<Option<[f64; 2]>>,
+    /// Posterior mean of the air's running 10 s mean at each of [`UpdraftMap::time_s`], m/s, with gaps filled from
+    /// neighbours ([`UpdraftMap::posterior`]); empty: there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub posterior_mps: Vec<Option<f64>>,
+    /// Its standard deviation, all origins of error included, m/s.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub posterior_sd_mps: Vec<Option<f64>>,
+    /// Posterior of the mean over the drone's seconds, m/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub posterior_mean: Option<Estimate>,
     /// What is doubtful, by stretches of time.
     #[serde(default)]
     pub quality: Vec<QualityFlag>,

@@ -118,6 +118,8 @@ pub(super) struct WindowPoint {
     /// What was commanded, and its count among equals: the same for all drones of the fleet.
     pub(super) key: (String, usize),
     pub(super) time_s: f64,
+    /// Height above home, m.
+    pub(super) height_m: f64,
     pub(super) velocity_mps: f64,
     pub(super) pulse_us: f64,
     /// Standard error of pulse and velocity together, us.

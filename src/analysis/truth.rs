@@ -1,7 +1,29 @@
 //! Comparison of a map with the true air.
 
 use super::budget::TruthCheck;
+use super::posterior::half_mps;
 use super::result::DroneUpdraft;
+
+/// Compares the posterior with the truth; `None` where either is not known.
+pub(super) fn check_posterior(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
+    let posterior = |drone: &DroneUpdraft| {
+        let known = drone.posterior_mps.iter().zip(&drone.posterior_sd_mps);
+        let interval = |(mean, sd): (&Option<f64>, &Option<f64>)| {
+            let (mean, half) = ((*mean)?, half_mps((*sd)?));
+            Some([mean - half, mean + half])
+        };
+        let mean = drone.posterior_mean;
+        DroneUpdraft {
+            updraft_mps: drone.posterior_mps.clone(),
+            interval_mps: known.map(interval).collect(),
+            mean_interval_mps: mean
+                .map(|mean| [mean.value - half_mps(mean.se), mean.value + half_mps(mean.se)]),
+            truth_mps: drone.truth_mps.clone(),
+            ..drone.clone()
+        }
+    };
+    check(&drones.iter().map(posterior).collect::<Vec<_>>())
+}
 
 /// Compares estimates with the truth; `None` where the truth is not known.
 pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
@@ -71,6 +93,9 @@ mod tests {
             interval_mps: updraft_mps.iter().map(interval).collect(),
             updraft_mps,
             sd_mps: Vec::new(),
+            posterior_mps: Vec::new(),
+            posterior_sd_mps: Vec::new(),
+            posterior_mean: None,
             quality: Vec::new(),
             truth_mps,
         }

@@ -17,14 +17,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-use crate::numeric::extent;
+use crate::numeric::{extent, mean};
 
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
 use super::budget::CalibrationAir;
 use super::corrections::{BATTERY, DOUBTS, DRIFT};
 use super::local::{Deviations, Own, local_air};
 use super::shape::{PARAMETERS, Shape};
-use super::split::{Parts, Split, WindowPoint, noise_us, rough_sensitivity, rough_slope};
+use super::split::{Cell, Parts, Split, WindowPoint, noise_us, rough_sensitivity, rough_slope};
 
 /// Time scales of the air that are tried, s: from windows to beyond the flight (docs/errors.md). A grid.
 const TAUS_S: [f64; 7] = [8.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0];
@@ -48,6 +48,24 @@ pub(super) struct DroneLaw {
     pub(super) answers: [[f64; PARAMETERS]; DOUBTS],
 }
 
+/// Where and when an average over drones was flown.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CellAt {
+    pub(super) time_s: f64,
+    pub(super) height_m: f64,
+    /// Drones in it.
+    pub(super) drones: usize,
+}
+
+/// The averages over drones, for fits in other air.
+#[derive(Clone, Debug)]
+pub(super) struct Windows {
+    pub(super) record: Record,
+    pub(super) cells: Vec<CellAt>,
+    /// Parameters of the fleet's law.
+    pub(super) parameters: Vec<f64>,
+}
+
 /// The fit.
 #[derive(Clone, Debug)]
 pub(super) struct Zero {
@@ -63,6 +81,8 @@ pub(super) struct Zero {
     pub(super) width: f64,
     /// Lowest and highest vertical speed of the windows, m/s.
     pub(super) speeds_mps: [f64; 2],
+    /// What it was made of.
+    pub(super) windows: Windows,
 }
 
 /// The windows of a fleet with one shape of law, and what they say about the air.
@@ -185,6 +205,14 @@ impl<'a> Fleet<'a> {
         let interval = |value: fn(&Air) -> f64| {
             [0.025, 0.975].map(|share| quantile(&weighed, share, |one| value(&one.air)))
         };
+        let cell_at = |cell: &Cell| CellAt {
+            time_s: cell.time_s,
+            height_m: mean(cell.members.iter().map(|point| points[*point].height_m))
+                .unwrap_or_default(),
+            drones: cell.members.len(),
+        };
+        let cells = split.cells.iter().map(cell_at).collect();
+        let windows = Windows { record: fleet, cells, parameters: parameters.as_slice().to_vec() };
         let speeds = extent(points.iter().map(|point| point.velocity_mps));
         let (slowest, fastest) = speeds.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
         Zero {
@@ -201,6 +229,7 @@ impl<'a> Fleet<'a> {
             },
             width,
             speeds_mps: [slowest, fastest],
+            windows,
         }
     }
 }

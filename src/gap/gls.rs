@@ -5,8 +5,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::numeric::{extent, mean};
 
-use super::minimise::minimise;
 use super::noise::{COUNT, GroupPattern, Hyper, Whitener};
+use crate::numeric::minimise;
 
 /// Values of all drones, by group, drone and bin.
 pub(super) type Pulses = Vec<Vec<Vec<f64>>>;

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::bins::Bin;
 use super::filter::{Observation, State, log_det_and_chi2};
 use super::lean::LeanLaw;
-use super::minimise::{differences, minimise};
 use crate::numeric::mean;
+use crate::numeric::{differences, minimise};
 
 /// Prior standard deviation of the quadratic part of the model's own lean law, as a share. 0.4 was tried and
 /// taken back when the wind got an uncertainty of its own in the search.

@@ -30,7 +30,6 @@ mod left_out;
 mod make;
 mod map_gain;
 mod measure;
-mod minimise;
 mod model_flights;
 pub mod next;
 mod noise;

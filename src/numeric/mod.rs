@@ -1,4 +1,4 @@
-//! Means, medians, quantiles and straight lines: the arithmetic that every room needs and none owns.
+//! Means, medians, quantiles, straight lines and minima: the arithmetic that every room needs and none owns.
 //!
 //! * **Nothing** has no mean, median or extent: the answer is `None`, and the caller says what stands for it.
 //! * **NaN** spoils means and lines, as in any sum. [`least`], [`most`] and [`extent`] pass over it.
@@ -20,9 +20,11 @@
 //! ```
 
 mod line;
+mod minimise;
 mod moments;
 mod order;
 
 pub use line::Line;
+pub(crate) use minimise::{differences, minimise};
 pub use moments::{Moments, mean, rms};
 pub use order::{Sorted, extent, least, median, most, upper_median};

@@ -132,6 +132,9 @@ mod tests {
                 updraft_mps: Vec::new(),
                 sd_mps: Vec::new(),
                 interval_mps: Vec::new(),
+                posterior_mps: Vec::new(),
+                posterior_sd_mps: Vec::new(),
+                posterior_mean: None,
                 quality: Vec::new(),
                 truth_mps: None,
             })

@@ -47,6 +47,44 @@ pub fn fly(
     let known = toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
     write_whole(&folder.template(), flight.template_text.as_bytes())?;
     write_whole(&folder.vehicle(), known.as_bytes())?;
+    let settings = Settings {
+        world,
+        air_seed: world.seed,
+        charges: &scenario.nuisance.charges,
+        missing: &scenario.nuisance.missing,
+        stop,
+    };
+    let flown = fly_plan(plan, &settings, &folder)?;
+    // The plan last: a folder with a plan is whole.
+    let json = to_json(plan).map_err(|error| text("the plan", error.to_string()))?;
+    write_whole(&folder.plan(), &json)?;
+    Ok(flown)
+}
+
+/// How a plan is flown.
+#[derive(Clone, Copy)]
+pub struct Settings<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// Seed of the air's motion: flights of one fleet meet different air.
+    pub air_seed: u64,
+    /// Charge of each slot's battery, 0 to 1; full where there is none.
+    pub charges: &'a [f64],
+    /// Slots without a log.
+    pub missing: &'a [u16],
+    /// Ends the flight when raised.
+    pub stop: Option<&'a AtomicBool>,
+}
+
+/// Flies a plan: `folder` gets the logs that are not lost.
+///
+/// # Errors
+/// When nothing can be written, or the flight is stopped.
+pub fn fly_plan(
+    plan: &Plan,
+    settings: &Settings<'_>,
+    folder: &FlightFolder,
+) -> Result<Flown, BlindError> {
     let show = plan.to_show();
     let trajectories: Vec<Trajectory> = plan
         .slots
@@ -61,8 +99,8 @@ pub fn fly(
     let spans: Vec<[f64; 2]> = trajectories.iter().map(flown_s).collect();
     let from_s = spans.iter().map(|span| span[0]).fold(f64::INFINITY, f64::min);
     let to_s = spans.iter().map(|span| span[1]).fold(0.0, f64::max);
-    let air = Air::new(&world.air, span_s(from_s, to_s), world.seed);
-    let missing = &scenario.nuisance.missing;
+    let air = Air::new(&settings.world.air, span_s(from_s, to_s), settings.air_seed);
+    let Settings { world, missing, stop, .. } = *settings;
     let count = plan.slots.len();
     let flown: Vec<Option<u64>> = plan
         .slots
@@ -87,7 +125,7 @@ pub fn fly(
                 slot: slot.slot,
                 home_m: slot.home_m,
                 has_left: has_left(plan, slot),
-                charge: scenario.nuisance.charges.get(index).copied().unwrap_or(1.0),
+                charge: settings.charges.get(index).copied().unwrap_or(1.0),
                 target: &target,
                 takeoff_s: span[0],
                 end_s: span[1],
@@ -109,9 +147,6 @@ pub fn fly(
             Ok(Some(bytes.len() as u64))
         })
         .collect::<Result<_, BlindError>>()?;
-    // The plan last: a folder with a plan is whole.
-    let json = to_json(plan).map_err(|error| text("the plan", error.to_string()))?;
-    write_whole(&folder.plan(), &json)?;
     Ok(Flown {
         logs: flown.iter().flatten().count(),
         bytes: flown.iter().flatten().sum(),

@@ -11,7 +11,7 @@ const LONGEST: f64 = 1.0;
 
 /// Where a function is least, from a start, and its value there. BFGS with a backtracking line
 /// search; values that are not numbers count as infinite. The gradient is asked for at a place with its value.
-pub(super) fn minimise<const N: usize>(
+pub(crate) fn minimise<const N: usize>(
     start: [f64; N],
     function: impl Fn(&[f64; N]) -> f64,
     gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
@@ -71,7 +71,7 @@ pub(super) fn minimise<const N: usize>(
 }
 
 /// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.
-pub(super) fn differences<const N: usize>(
+pub(crate) fn differences<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     at: &[f64; N],
     value: f64,

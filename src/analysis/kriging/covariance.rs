@@ -1,0 +1,225 @@
+//! Covariance of the vertical air speed between two places and times, as means over 10 s show it.
+//!
+//! A field that varies over a length and a time and may drift with the wind, and gusts that each drone
+//! meets alone. What is asked for is the covariance of running means: gusts of a few seconds are mostly
+//! averaged away, and the field nearly not at all.
+
+use crate::analysis::running::RUNNING_S;
+
+/// Nodes of the mean over the difference of two times within windows of 10 s, as a share of the window, with their
+/// weights: the triangular density's second and fourth moments.
+const NODES: [(f64, f64); 3] =
+    [(0.0, 7.0 / 12.0), (0.632_455_532, 5.0 / 24.0), (-0.632_455_532, 5.0 / 24.0)];
+
+/// How the correlation of a field falls with distance and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in super::super) enum Form {
+    /// `exp(-r/lambda) exp(-|dt|/tau)`: rough at all scales, as turbulence is.
+    #[default]
+    Exponential,
+    /// `exp(-(r/lambda)^2 - (dt/tau)^2)`: smooth.
+    Gaussian,
+}
+
+impl Form {
+    /// In a few words.
+    pub(in super::super) fn words(self) -> &'static str {
+        match self {
+            Self::Exponential => "exponential",
+            Self::Gaussian => "Gaussian",
+        }
+    }
+}
+
+/// Scales of the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in super::super) struct Air {
+    pub(in super::super) form: Form,
+    /// Standard deviation of the field, m/s.
+    pub(in super::super) sd_mps: f64,
+    /// Distance at which its correlation is 1/e, m: the geometric mean over directions.
+    pub(in super::super) length_m: f64,
+    /// Logarithms of how much longer the field is along x than along y, and along the diagonal than across
+    /// it (halves).
+    pub(in super::super) stretch: [f64; 2],
+    /// Time after which its correlation is 1/e for who drifts along, s.
+    pub(in super::super) time_s: f64,
+    /// How fast the field drifts, along show x and y, m/s.
+    pub(in super::super) drift_mps: [f64; 2],
+    /// Standard deviation of each drone's own gusts, m/s.
+    pub(in super::super) gust_mps: f64,
+    /// Their time scale, s.
+    pub(in super::super) gust_s: f64,
+}
+
+/// A place (show frame, z up, m) at a time (s), and whose it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    pub(super) place_m: [f64; 3],
+    pub(super) time_s: f64,
+    /// Gusts are shared only by what has the same number; `None`: meets none.
+    pub(super) drone: Option<usize>,
+}
+
+/// The covariance function of an air, with what does not depend on the spots computed once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Covariance {
+    air: Air,
+    /// Inverse of the matrix of lengths.
+    inverse: [[f64; 2]; 2],
+}
+
+impl Covariance {
+    pub(super) fn new(air: Air) -> Self {
+        // The exponential of a symmetric matrix without trace.
+        let [q, r] = air.stretch;
+        let size = q.hypot(r);
+        let (cosh, sinh) = if size > 1e-9 { (size.cosh(), size.sinh() / size) } else { (1.0, 1.0) };
+        let inverse = [[cosh - sinh * q, -sinh * r], [-sinh * r, cosh + sinh * q]]
+            .map(|row| row.map(|value| value / air.length_m));
+        Self { air, inverse }
+    }
+
+    /// Covariance of two means over 10 s, (m/s)².
+    pub(super) fn of(&self, one: &Spot, other: &Spot) -> f64 {
+        let apart_s = one.time_s - other.time_s;
+        let apart_m = [0, 1, 2].map(|axis| one.place_m[axis] - other.place_m[axis]);
+        let field = self.field(apart_m, apart_s);
+        if one.drone.is_some() && one.drone == other.drone {
+            field + self.gusts(apart_s)
+        } else {
+            field
+        }
+    }
+
+    /// Covariance of the field alone, (m/s)².
+    pub(super) fn field(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
+        let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
+        let still = u == 0.0 && v == 0.0;
+        let variance = sd_mps * sd_mps;
+        if still && form == Form::Exponential {
+            return variance * (-self.distance(apart_m)).exp() * mean_exponential(apart_s, time_s);
+        }
+        let mut sum = 0.0;
+        for (node, weight) in NODES {
+            let dt = apart_s + node * RUNNING_S;
+            let moved = [apart_m[0] - u * dt, apart_m[1] - v * dt, apart_m[2]];
+            let (r, t) = (self.distance(moved), dt.abs() / time_s);
+            sum += weight
+                * match form {
+                    Form::Exponential => (-r - t).exp(),
+                    Form::Gaussian => (-r * r - t * t).exp(),
+                };
+        }
+        variance * sum
+    }
+
+    /// Covariance of a drone's own gusts, (m/s)².
+    pub(super) fn gusts(&self, apart_s: f64) -> f64 {
+        self.air.gust_mps.powi(2) * mean_exponential(apart_s, self.air.gust_s)
+    }
+
+    /// Distance in units of the length.
+    fn distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+        let [[a, b], [c, d]] = self.inverse;
+        let (along, across) = (a * x + b * y, c * x + d * y);
+        let up = z / self.air.length_m;
+        (along * along + across * across + up * up).sqrt()
+    }
+}
+
+/// Mean of `exp(-|t|/tau)` over two windows of 10 s whose middles are so far apart.
+fn mean_exponential(apart_s: f64, tau_s: f64) -> f64 {
+    let (ratio, apart) = (RUNNING_S / tau_s, apart_s.abs() / tau_s);
+    if ratio < 1e-3 {
+        return (-apart).exp();
+    }
+    let square = ratio * ratio;
+    if apart >= ratio {
+        return (-apart).exp() * (2.0 * ratio.cosh() - 2.0) / square;
+    }
+    // Windows that overlap.
+    let (inner, outer) = (ratio - apart, ratio + apart);
+    ((-inner).exp() + (-outer).exp() - 2.0 * (-apart).exp() + 2.0 * inner) / square
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn air(form: Form) -> Air {
+        Air {
+            form,
+            sd_mps: 0.5,
+            length_m: 80.0,
+            stretch: [0.0; 2],
+            time_s: 60.0,
+            drift_mps: [0.0; 2],
+            gust_mps: 0.2,
+            gust_s: 4.0,
+        }
+    }
+
+    fn spot(place_m: [f64; 3], time_s: f64, drone: usize) -> Spot {
+        Spot { place_m, time_s, drone: Some(drone) }
+    }
+
+    /// The mean of a correlation over two windows, by summing.
+    fn summed(apart_s: f64, correlation: impl Fn(f64) -> f64) -> f64 {
+        let steps = 400;
+        let at = |index: usize| (index as f64 + 0.5) / steps as f64 * RUNNING_S;
+        let mut sum = 0.0;
+        for one in 0..steps {
+            for other in 0..steps {
+                sum += correlation(apart_s + at(one) - at(other));
+            }
+        }
+        sum / (steps * steps) as f64
+    }
+
+    #[test]
+    fn means_over_windows_have_the_covariance_that_sums_say() {
+        for tau_s in [3.0, 40.0, 300.0] {
+            for apart_s in [0.0, 4.0, 10.0, 35.0] {
+                let expected = summed(apart_s, |dt| (-dt.abs() / tau_s).exp());
+                let found = mean_exponential(apart_s, tau_s);
+                assert!((found - expected).abs() < 1e-3, "{tau_s} {apart_s}: {found} {expected}");
+            }
+        }
+        let covariance = Covariance::new(Air { drift_mps: [2.0, 0.0], ..air(Form::Gaussian) });
+        let expected = 0.25
+            * summed(20.0, |dt| (-((30.0 - 2.0 * dt) / 80.0).powi(2) - (dt / 60.0).powi(2)).exp());
+        let found = covariance.field([30.0, 0.0, 0.0], 20.0);
+        assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+    }
+
+    #[test]
+    fn gusts_are_a_drones_own_and_a_field_is_longer_along_its_stretch() {
+        let covariance = Covariance::new(air(Form::Exponential));
+        let here = spot([0.0; 3], 0.0, 1);
+        let own = covariance.of(&here, &here);
+        let neighbour = covariance.of(&here, &spot([0.0; 3], 0.0, 2));
+        assert!(own > neighbour + 0.015, "{own} {neighbour}");
+        let stretched = Covariance::new(Air { stretch: [0.5, 0.0], ..air(Form::Exponential) });
+        let (along, across) =
+            (stretched.field([40.0, 0.0, 0.0], 0.0), stretched.field([0.0, 40.0, 0.0], 0.0));
+        assert!(along > covariance.field([40.0, 0.0, 0.0], 0.0) && along > across);
+        let ratio = stretched.distance([1.0, 0.0, 0.0]) / stretched.distance([0.0, 1.0, 0.0]);
+        assert!((ratio - (-1.0_f64).exp()).abs() < 1e-9, "{ratio}");
+        let diagonal = Covariance::new(Air { stretch: [0.0, 0.5], ..air(Form::Exponential) });
+        let (with, against) =
+            (diagonal.distance([1.0, 1.0, 0.0]), diagonal.distance([1.0, -1.0, 0.0]));
+        assert!((with / against - (-1.0_f64).exp()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_field_that_drifts_is_found_where_it_went() {
+        for form in [Form::Exponential, Form::Gaussian] {
+            let drifting =
+                Covariance::new(Air { drift_mps: [2.0, -1.0], time_s: 1e4, ..air(form) });
+            let followed = drifting.field([60.0, -30.0, 0.0], 30.0);
+            assert!(followed > 0.9 * drifting.field([0.0; 3], 0.0), "{form:?} {followed}");
+            assert!(followed > 1.5 * drifting.field([0.0; 3], 30.0));
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Values of a map with what is uncertain about them, as the model of the air sees them.
+
+use super::covariance::Spot;
+use crate::analysis::corrections::DOUBTS;
+use crate::analysis::shape::PARAMETERS;
+
+/// Errors that all drones share: the parameters of the fleet's law, the doubts of the corrections, and
+/// the updraft that is everywhere the same.
+pub(super) const COMMON: usize = PARAMETERS + DOUBTS + 1;
+/// Place of the updraft that is everywhere the same.
+pub(super) const UNIFORM: usize = COMMON - 1;
+
+/// One value: the mean over the 10 s around a second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in super::super) struct Value {
+    /// Vertical air speed, m/s, up positive.
+    pub(in super::super) updraft_mps: f64,
+    /// What one unit of each of the fleet's law parameters adds to it, m/s.
+    pub(in super::super) law: [f64; PARAMETERS],
+    /// What one standard error of each doubt adds to it, m/s.
+    pub(in super::super) doubts_mps: [f64; DOUBTS],
+    /// Standard error by the drone's own part of its law, m/s.
+    pub(in super::super) own_mps: f64,
+    /// Standard error by noise of pulse and velocity, m/s.
+    pub(in super::super) noise_mps: f64,
+}
+
+/// One drone's values.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Drone {
+    /// Where it was at each second, show frame, m; for a hover always the same.
+    pub(in super::super) place_m: Vec<[f64; 3]>,
+    /// Values at the seconds common to all drones.
+    pub(in super::super) values: Vec<Option<Value>>,
+    /// Standard error of the slope of its law as a share of it.
+    pub(in super::super) slope_share: f64,
+}
+
+/// One value as a row of the model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) spot: Spot,
+    pub(super) value_mps: f64,
+    pub(super) common: [f64; COMMON],
+    pub(super) noise_mps: f64,
+}
+
+/// Values that share no second: one in each 10 s of each drone.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    pub(super) rows: Vec<Row>,
+    /// Index of the drone's and the second's row.
+    pub(super) place: Vec<Vec<Option<usize>>>,
+    /// Seconds of the record that the rows are at.
+    pub(super) seconds: Vec<usize>,
+}
+
+impl Rows {
+    /// The rows at `first`, `first + step`, ... of the record.
+    pub(super) fn of(drones: &[Drone], first: usize, step: usize) -> Self {
+        let length = drones.iter().map(|drone| drone.values.len()).max().unwrap_or(0);
+        let seconds: Vec<usize> = (first..length).step_by(step.max(1)).collect();
+        let mut rows = Vec::new();
+        let mut place = vec![vec![None; seconds.len()]; drones.len()];
+        for (block, second) in seconds.iter().enumerate() {
+            for (index, drone) in drones.iter().enumerate() {
+                let value = drone.values.get(*second).copied().flatten();
+                let Some((value, place_m)) = value.zip(drone.place_at(*second)) else { continue };
+                let mut common = [0.0; COMMON];
+                common[..PARAMETERS].copy_from_slice(&value.law);
+                common[PARAMETERS..UNIFORM].copy_from_slice(&value.doubts_mps);
+                common[UNIFORM] = 1.0;
+                place[index][block] = Some(rows.len());
+                let spot = Spot { place_m, time_s: *second as f64, drone: Some(index) };
+                let noise_mps = value.noise_mps.max(LEAST_NOISE_MPS);
+                rows.push(Row { spot, value_mps: value.updraft_mps, common, noise_mps });
+            }
+        }
+        Self { rows, place, seconds }
+    }
+}
+
+/// No value is known better, m/s: quantization, and small effects that nothing here describes. Chosen.
+const LEAST_NOISE_MPS: f64 = 0.005;
+
+impl Drone {
+    pub(super) fn place_at(&self, second: usize) -> Option<[f64; 3]> {
+        self.place_m.get(second).or(self.place_m.last()).copied()
+    }
+
+    /// Whether it stands still in the map.
+    pub(super) fn hovers(&self) -> bool {
+        self.place_m.len() == 1
+    }
+
+    /// Standard error by its own part of its law, m/s: the mean over its values.
+    pub(super) fn own_mps(&self) -> f64 {
+        crate::numeric::mean(self.values.iter().flatten().map(|value| value.own_mps)).unwrap_or(0.0)
+    }
+}

@@ -1,0 +1,242 @@
+//! The posterior map of a flight.
+
+use super::adequacy::{Adequacy, judge};
+use super::calibration::{Calibration, Component, factor};
+use super::covariance::{Air, Covariance};
+use super::data::{Drone, Rows, UNIFORM};
+use super::neighbours::{Neighbours, Reach, before};
+use super::predict::{Linear, Model, Series};
+use super::scales::{
+    Found, LN_LENGTH, LN_TIME, Sample, Search, UNIFORM_MPS, log_prior, open_factor,
+};
+use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
+use crate::analysis::corrections::DOUBTS;
+use crate::analysis::running::RUNNING_S;
+use crate::analysis::shape::PARAMETERS;
+
+/// What the likelihood conditions on.
+const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
+/// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
+const FEWEST: usize = 24;
+/// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
+/// Over level ground there is none in the long run. Chosen.
+const UNIFORM_SHARE: f64 = 0.2;
+/// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
+/// leaves, before its scales are known.
+const OWN_MPS: f64 = 0.08;
+/// Standard errors to each side of a normal 95 % interval.
+pub(super) const NORMAL: f64 = 1.96;
+
+/// A flight's values with its calibration.
+pub(in super::super) struct Input<'a> {
+    /// Drones with values.
+    pub(in super::super) drones: &'a [Drone],
+    /// Places without a log, show frame, m.
+    pub(in super::super) lost_m: &'a [[f64; 3]],
+    /// Seconds of the record.
+    pub(in super::super) seconds: usize,
+    pub(in super::super) calibration: Calibration<'a>,
+    /// Pulse per vertical air speed of the fleet, us/(m/s).
+    pub(in super::super) slope: f64,
+    /// Mean wind along show x and y, m/s.
+    pub(in super::super) wind_mps: Option<[f64; 2]>,
+}
+
+/// One scale of the air: the most probable value with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in super::super) struct Scale {
+    pub(in super::super) value: f64,
+    pub(in super::super) interval: [f64; 2],
+}
+
+/// The map with what was found on the way.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Posterior {
+    /// At the drones.
+    pub(in super::super) drones: Vec<Series>,
+    /// At the places without a log.
+    pub(in super::super) lost: Vec<Series>,
+    /// Mean over all drones and seconds with its standard error, m/s.
+    pub(in super::super) fleet_mps: Option<(f64, f64)>,
+    pub(in super::super) air: Air,
+    pub(in super::super) length_m: Scale,
+    pub(in super::super) time_s: Scale,
+    pub(in super::super) adequacy: Adequacy,
+    /// What is added to all values, m/s: how far the zero moved.
+    pub(in super::super) zero_shift_mps: f64,
+    /// Probability of an updraft that is everywhere the same.
+    pub(in super::super) uniform_probability: f64,
+}
+
+/// One choice of everything that is not linear, with what follows.
+struct Choice {
+    log_weight: f64,
+    solved: Solved,
+    is_uniform: bool,
+}
+
+/// The posterior map; `None` with too few values, or where none of the scales fits at all.
+pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
+    let step = RUNNING_S as usize;
+    let first = (input.seconds.saturating_sub(1) % step) / 2;
+    let rows = Rows::of(input.drones, first, step);
+    if rows.rows.len() < FEWEST {
+        return None;
+    }
+    let neighbours = before(input.drones, &rows, REACH);
+    let roughly: Vec<f64> =
+        input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();
+    let search = Search {
+        rows: &rows,
+        neighbours: &neighbours,
+        own_mps: &roughly,
+        wind_mps: input.wind_mps,
+        factor: open_factor(&prior_factor(None, false)),
+    };
+    let found = search.best()?;
+    let air = search.air(found.form, &found.best);
+    // Air that each drone met alone in its calibration is in its constant.
+    let own = input.calibration.own_us(&air) / input.slope.max(1.0);
+    let own_mps: Vec<f64> = input.drones.iter().map(|drone| drone.own_mps().max(own)).collect();
+    let search = Search { own_mps: &own_mps, ..search };
+    let samples = search.samples(&found, |point| {
+        let system = search.system(found.form, point)?;
+        let components = input.calibration.components(&search.air(found.form, point));
+        let choices = choices(&system, &components);
+        let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
+        Some((log_likelihood + log_prior(point), choices))
+    });
+    let (mean, covariance, uniform_probability) = mixed(&samples)?;
+    let system = search.system(found.form, &found.best)?;
+    let (own, answers) = system.own();
+    let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
+    let model = Model { drones: input.drones, covariance: Covariance::new(air), linear };
+    let adequacy = adequate(&model, &rows, &neighbours);
+    let mut sites: Vec<(Option<usize>, [f64; 3])> = (0..input.drones.len())
+        .map(|index| (Some(index), input.drones[index].place_at(0).unwrap_or_default()))
+        .collect();
+    sites.extend(input.lost_m.iter().map(|place_m| (None, *place_m)));
+    let mut drones = model.at(&sites, input.seconds);
+    let lost = drones.split_off(input.drones.len());
+    for (series, drone) in drones.iter_mut().zip(input.drones) {
+        series.keep_near(drone);
+        series.doubt_slope(drone.slope_share);
+    }
+    let zero_shift_mps = shift(&model, &rows);
+    Some(Posterior {
+        fleet_mps: model.fleet(&rows),
+        drones,
+        lost,
+        air,
+        length_m: scale(&samples, &found, LN_LENGTH),
+        time_s: scale(&samples, &found, LN_TIME),
+        adequacy,
+        zero_shift_mps,
+        uniform_probability,
+    })
+}
+
+/// Factor of the common errors' covariance: a component's law (none: not known), the doubts, and a uniform
+/// updraft or none.
+fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
+    let mut prior = Common::zeros();
+    if let Some(component) = component {
+        let law = factor(&component.covariance);
+        for row in 0..law.nrows().min(PARAMETERS) {
+            for column in 0..law.ncols().min(PARAMETERS) {
+                prior[(row, column)] = law[(row, column)];
+            }
+        }
+    }
+    for doubt in PARAMETERS..PARAMETERS + DOUBTS {
+        prior[(doubt, doubt)] = 1.0;
+    }
+    prior[(UNIFORM, UNIFORM)] = if is_uniform { UNIFORM_MPS } else { 0.0 };
+    prior
+}
+
+/// All choices of the calibration's air and of a uniform updraft, for one choice of the scales.
+fn choices(system: &System, components: &[Component]) -> Vec<Choice> {
+    let mut found = Vec::new();
+    for component in components {
+        let mut mean = CommonVector::zeros();
+        mean.iter_mut().zip(component.shift).for_each(|(mean, shift)| *mean = shift);
+        for (is_uniform, share) in [(false, 1.0 - UNIFORM_SHARE), (true, UNIFORM_SHARE)] {
+            let Some(solved) = system.posterior(&mean, &prior_factor(Some(component), is_uniform))
+            else {
+                continue;
+            };
+            let log_weight = solved.log_likelihood + component.log_weight + share.ln();
+            if log_weight.is_finite() {
+                found.push(Choice { log_weight, solved, is_uniform });
+            }
+        }
+    }
+    found
+}
+
+/// Logarithm of a sum of exponentials.
+fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
+}
+
+/// Mean and covariance of the common errors over all choices, and the weight of a uniform updraft.
+fn mixed(samples: &[(Sample, Vec<Choice>)]) -> Option<(CommonVector, Common, f64)> {
+    let weighed: Vec<(f64, &Choice)> = samples
+        .iter()
+        .flat_map(|(sample, choices)| {
+            let sum = log_sum(choices.iter().map(|choice| choice.log_weight));
+            choices
+                .iter()
+                .map(move |choice| (sample.weight * (choice.log_weight - sum).exp(), choice))
+        })
+        .collect();
+    if weighed.is_empty() {
+        return None;
+    }
+    let mut mean = CommonVector::zeros();
+    for (weight, choice) in &weighed {
+        mean += choice.solved.mean * *weight;
+    }
+    let mut covariance = Common::zeros();
+    for (weight, choice) in &weighed {
+        let off = choice.solved.mean - mean;
+        covariance += (choice.solved.covariance + off * off.transpose()) * *weight;
+    }
+    let uniform =
+        weighed.iter().filter(|(_, choice)| choice.is_uniform).map(|(weight, _)| weight).sum();
+    (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
+}
+
+/// A scale that is searched as a logarithm, with its interval by the weighed samples, and by the curvature where that says
+/// less.
+fn scale<T>(samples: &[(Sample, T)], found: &Found, index: usize) -> Scale {
+    let mean: f64 = samples.iter().map(|(sample, _)| sample.weight * sample.point[index]).sum();
+    let variance: f64 = samples
+        .iter()
+        .map(|(sample, _)| sample.weight * (sample.point[index] - mean).powi(2))
+        .sum();
+    let sd = variance.max(found.covariance[(index, index)]).sqrt();
+    let at = |sds: f64| (found.best[index] + sds * sd).exp();
+    Scale { value: at(0.0), interval: [at(-NORMAL), at(NORMAL)] }
+}
+
+fn adequate(model: &Model<'_>, rows: &Rows, neighbours: &Neighbours) -> Adequacy {
+    let left: Vec<f64> = rows
+        .rows
+        .iter()
+        .map(|row| model.left(row.spot.drone, &row.common, row.value_mps))
+        .collect();
+    let innovations = innovations(rows, neighbours, &model.covariance, &left);
+    let drones: Vec<usize> = rows.rows.iter().map(|row| row.spot.drone.unwrap_or(0)).collect();
+    judge(&innovations, &drones)
+}
+
+/// How far the common errors move the values on average, m/s.
+fn shift(model: &Model<'_>, rows: &Rows) -> f64 {
+    let mut mean = model.linear.mean;
+    mean[UNIFORM] = 0.0;
+    let moved = rows.rows.iter().map(|row| -CommonVector::from(row.common).dot(&mean));
+    crate::numeric::mean(moved).unwrap_or(0.0)
+}

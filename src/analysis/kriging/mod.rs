@@ -1,0 +1,26 @@
+//! The map of the air as one estimate: what all values of a flight, its calibration and the scales of the
+//! air say together about the vertical air speed at each drone and second, and between the drones.
+//!
+//! ```text
+//! y(i, t) = W + f(x_i, t) + g_i(t) + B(i, t) beta + a_i + noise
+//! ```
+//!
+//! with a uniform updraft `W`, a Gaussian field `f` that may drift with the wind, gusts `g_i` of each drone's
+//! own ([`covariance`]), errors `beta` that all drones share (the fleet's law with its zero, and the doubts of the
+//! corrections) and a constant `a_i` of each drone. Scales are found by the likelihood ([`scales`]) of nearest
+//! neighbours in space and time ([`neighbours`], [`vecchia`]); the zero by hover and calibration together
+//! ([`calibration`]); and the map is the posterior mean with its standard deviation ([`predict`]).
+
+mod adequacy;
+mod calibration;
+mod covariance;
+mod data;
+mod make;
+mod neighbours;
+mod predict;
+mod scales;
+mod vecchia;
+
+pub(super) use calibration::Calibration;
+pub(super) use data::{Drone, Value};
+pub(super) use make::{Input, Scale, posterior};

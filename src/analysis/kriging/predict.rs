@@ -1,0 +1,263 @@
+//! The air at drones, and between them, after all values were seen (kriging with estimated constants).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::covariance::Covariance;
+use super::data::{COMMON, Drone, Rows, UNIFORM};
+use super::neighbours::{Reach, around};
+use super::vecchia::{Common, CommonVector, Weights, weights};
+use crate::analysis::running::RUNNING_S;
+
+/// What is looked at around a place.
+const REACH: Reach = Reach { beside: 10, step: 6, own: 1 };
+
+/// Everything linear as the values and the calibration leave it.
+#[derive(Clone, Debug)]
+pub(super) struct Linear {
+    /// Common errors.
+    pub(super) mean: CommonVector,
+    pub(super) covariance: Common,
+    /// Constants of the drones at common errors of zero, m/s.
+    pub(super) own: DVector<f64>,
+    /// How the constants answer the common errors, negated.
+    pub(super) answers: DMatrix<f64>,
+    /// Covariance of the constants where the common errors are known.
+    pub(super) own_covariance: DMatrix<f64>,
+}
+
+/// The air at one place: means over the 10 s around each second with standard deviations, m/s; and over all
+/// seconds that have a value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in super::super) struct Series {
+    pub(in super::super) mean_mps: Vec<Option<f64>>,
+    pub(in super::super) sd_mps: Vec<Option<f64>>,
+    /// Mean over the seconds with a value, with its standard error.
+    pub(in super::super) over_all: Option<(f64, f64)>,
+}
+
+/// What is asked for at a place and time: the value, its variance, and what it hangs on.
+struct Asked {
+    value_mps: f64,
+    variance: f64,
+    /// By the common errors, with the drones' constants following them.
+    by_common: CommonVector,
+    /// By the constants.
+    by_own: Vec<(usize, f64)>,
+}
+
+/// The model at its best with all values.
+pub(super) struct Model<'a> {
+    pub(super) drones: &'a [Drone],
+    pub(super) covariance: Covariance,
+    pub(super) linear: Linear,
+}
+
+impl Model<'_> {
+    /// The air at sites (a drone, or a fixed place) over the record of so many seconds.
+    pub(super) fn at(&self, sites: &[(Option<usize>, [f64; 3])], seconds: usize) -> Vec<Series> {
+        let step = RUNNING_S as usize;
+        let phases: Vec<Vec<(usize, Vec<Option<Asked>>)>> = (0..step.min(seconds))
+            .into_par_iter()
+            .map(|phase| self.phase(sites, phase, step))
+            .collect();
+        let mut found: Vec<Gathered> = sites.iter().map(|_| Gathered::new(seconds)).collect();
+        for phase in phases {
+            for (second, asked) in phase {
+                for (site, asked) in found.iter_mut().zip(asked) {
+                    if let Some(asked) = asked {
+                        site.add(second, &asked);
+                    }
+                }
+            }
+        }
+        found.into_iter().map(|site| site.series(&self.linear)).collect()
+    }
+
+    /// All sites at one second of each step.
+    fn phase(
+        &self,
+        sites: &[(Option<usize>, [f64; 3])],
+        phase: usize,
+        step: usize,
+    ) -> Vec<(usize, Vec<Option<Asked>>)> {
+        let rows = Rows::of(self.drones, phase, step);
+        let near = around(self.drones, &rows, sites, REACH);
+        let weights: Vec<Option<Weights>> =
+            near.patterns.iter().map(|pattern| weights(pattern, &self.covariance, false)).collect();
+        let left: Vec<f64> = rows
+            .rows
+            .iter()
+            .map(|row| self.left(row.spot.drone, &row.common, row.value_mps))
+            .collect();
+        rows.seconds
+            .iter()
+            .enumerate()
+            .map(|(block, second)| {
+                let asked = (0..sites.len())
+                    .map(|site| {
+                        let target = block * sites.len() + site;
+                        let weights = weights[near.of[target]].as_ref()?;
+                        Some(self.asked(weights, &near.rows[target], &rows, &left))
+                    })
+                    .collect();
+                (*second, asked)
+            })
+            .collect()
+    }
+
+    /// A value less all that is linear: the field and gusts.
+    pub(super) fn left(&self, drone: Option<usize>, common: &[f64; COMMON], value_mps: f64) -> f64 {
+        let common = CommonVector::from(*common).dot(&self.linear.mean);
+        value_mps - common - drone.map_or(0.0, |drone| self.own(drone))
+    }
+
+    /// Mean over all rows, with its standard error, m/s.
+    pub(super) fn fleet(&self, rows: &Rows) -> Option<(f64, f64)> {
+        let n = rows.rows.len() as f64;
+        if rows.rows.is_empty() {
+            return None;
+        }
+        let mut mean = 0.0;
+        let mut by_common = CommonVector::zeros();
+        let mut by_own = vec![0.0; self.drones.len()];
+        let mut noise = 0.0;
+        for row in &rows.rows {
+            mean += self.left(row.spot.drone, &row.common, row.value_mps) / n;
+            by_common -= CommonVector::from(row.common) / n;
+            noise += (row.noise_mps / n).powi(2);
+            let Some(drone) = row.spot.drone else { continue };
+            for column in 0..COMMON {
+                by_common[column] += self.linear.answers[(drone, column)] / n;
+            }
+            by_own[drone] -= 1.0 / n;
+        }
+        // The uniform updraft is air, too.
+        by_common[UNIFORM] += 1.0;
+        let by_own: Vec<(usize, f64)> = by_own.into_iter().enumerate().collect();
+        let variance = self.linear.variance(&by_common, &by_own) + noise;
+        Some((mean + self.linear.mean[UNIFORM], variance.sqrt()))
+    }
+
+    fn own(&self, drone: usize) -> f64 {
+        let answer: f64 = (0..COMMON)
+            .map(|column| self.linear.answers[(drone, column)] * self.linear.mean[column])
+            .sum();
+        self.linear.own[drone] - answer
+    }
+
+    fn asked(&self, weights: &Weights, near: &[u32], rows: &Rows, left: &[f64]) -> Asked {
+        let mut value_mps = self.linear.mean[UNIFORM];
+        let mut by_common = CommonVector::zeros();
+        by_common[UNIFORM] = 1.0;
+        let mut by_own: Vec<(usize, f64)> = Vec::new();
+        for (weight, row) in weights.of.iter().zip(near) {
+            let row = *row as usize;
+            value_mps += weight * left[row];
+            let seen = &rows.rows[row];
+            for column in 0..COMMON {
+                by_common[column] -= weight * seen.common[column];
+            }
+            let Some(drone) = seen.spot.drone else { continue };
+            for column in 0..COMMON {
+                by_common[column] += weight * self.linear.answers[(drone, column)];
+            }
+            match by_own.iter_mut().find(|(known, _)| *known == drone) {
+                Some((_, by)) => *by -= weight,
+                None => by_own.push((drone, -weight)),
+            }
+        }
+        let linear = self.linear.variance(&by_common, &by_own);
+        Asked { value_mps, variance: weights.variance + linear, by_common, by_own }
+    }
+}
+
+impl Linear {
+    fn variance(&self, by_common: &CommonVector, by_own: &[(usize, f64)]) -> f64 {
+        let mut sum = by_common.dot(&(self.covariance * by_common));
+        for (one, by) in by_own {
+            for (other, other_by) in by_own {
+                sum += by * other_by * self.own_covariance[(*one, *other)];
+            }
+        }
+        sum.max(0.0)
+    }
+}
+
+impl Series {
+    /// Widens values by a doubt of the law's slope: it moves them away from their mean.
+    pub(super) fn doubt_slope(&mut self, share: f64) {
+        let Some((mean, _)) = self.over_all else { return };
+        for (value, sd) in self.mean_mps.iter().zip(&mut self.sd_mps) {
+            if let Some((value, sd)) = value.zip(sd.as_mut()) {
+                *sd = sd.hypot(share * (value - mean));
+            }
+        }
+    }
+
+    /// Drops what lies before the first and behind the last value of a drone.
+    pub(super) fn keep_near(&mut self, drone: &Drone) {
+        let has = |value: &Option<super::data::Value>| value.is_some();
+        let first = drone.values.iter().position(has).unwrap_or(usize::MAX);
+        let last = drone.values.iter().rposition(has).unwrap_or(0);
+        let outside = |index: usize| index < first || index > last;
+        for values in [&mut self.mean_mps, &mut self.sd_mps] {
+            values
+                .iter_mut()
+                .enumerate()
+                .filter(|(index, _)| outside(*index))
+                .for_each(|(_, value)| *value = None);
+        }
+    }
+}
+
+/// What was asked for at one site, second by second.
+struct Gathered {
+    series: Series,
+    count: f64,
+    sum: f64,
+    variances: f64,
+    by_common: CommonVector,
+    by_own: std::collections::BTreeMap<usize, f64>,
+}
+
+impl Gathered {
+    fn new(seconds: usize) -> Self {
+        let series =
+            Series { mean_mps: vec![None; seconds], sd_mps: vec![None; seconds], over_all: None };
+        Self {
+            series,
+            count: 0.0,
+            sum: 0.0,
+            variances: 0.0,
+            by_common: CommonVector::zeros(),
+            by_own: std::collections::BTreeMap::new(),
+        }
+    }
+
+    fn add(&mut self, second: usize, asked: &Asked) {
+        self.series.mean_mps[second] = Some(asked.value_mps);
+        self.series.sd_mps[second] = Some(asked.variance.sqrt());
+        self.count += 1.0;
+        self.sum += asked.value_mps;
+        self.variances += asked.variance;
+        self.by_common += asked.by_common;
+        for (drone, by) in &asked.by_own {
+            *self.by_own.entry(*drone).or_default() += by;
+        }
+    }
+
+    fn series(mut self, linear: &Linear) -> Series {
+        if self.count > 0.0 {
+            let n = self.count;
+            let by_own: Vec<(usize, f64)> =
+                self.by_own.into_iter().map(|(drone, by)| (drone, by / n)).collect();
+            let by_common = self.by_common / n;
+            let linear = linear.variance(&by_common, &by_own);
+            // What kriging leaves lasts about as long as its windows.
+            let rest = (self.variances / n - linear).max(0.0) * (RUNNING_S / n).min(1.0);
+            self.series.over_all = Some((self.sum / n, (linear + rest).sqrt()));
+        }
+        self.series
+    }
+}

@@ -1,0 +1,272 @@
+//! Scales of the air by the likelihood of a map's values: the most probable ones, and a sample of those
+//! that the values allow.
+
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
+
+use super::covariance::{Air, Covariance, Form};
+use super::data::{Rows, UNIFORM};
+use super::neighbours::Neighbours;
+use super::vecchia::{Common, CommonVector, System};
+use crate::numeric::{differences, minimise};
+
+/// Scales that are searched, mostly as logarithms.
+pub(super) const SCALES: usize = 8;
+const LN_SD: usize = 0;
+pub(super) const LN_LENGTH: usize = 1;
+const STRETCH_ALONG: usize = 2;
+const STRETCH_DIAGONAL: usize = 3;
+pub(super) const LN_TIME: usize = 4;
+/// Drift as a share of the wind.
+const DRIFT: usize = 5;
+const LN_GUST: usize = 6;
+const LN_GUST_TIME: usize = 7;
+
+/// Scales as they are searched.
+pub(super) type Point = [f64; SCALES];
+
+/// What is known before the values are seen: mean and standard deviation of each scale. A field day has 0.5 m/s,
+/// 145 m and 186 s (docs/physics.md, 4.1); the priors reach from a tenth to ten times that and more, and only
+/// matter where the values say nothing. A field drifts with the wind, or does not.
+const PRIOR: [(f64, f64); SCALES] = [
+    (-1.2, 1.5),
+    (4.4, 1.0),
+    (0.0, 0.35),
+    (0.0, 0.35),
+    (4.6, 1.0),
+    (0.5, 0.5),
+    (-2.3, 1.5),
+    (1.4, 0.6),
+];
+
+/// The updraft that is everywhere the same, before the values are seen: standard deviation, m/s.
+pub(super) const UNIFORM_MPS: f64 = 3.0;
+/// Scales further from the prior than this many standard deviations are not looked at.
+const FARTHEST: f64 = 4.0;
+/// Step of the second differences. Numerical.
+const STEP: f64 = 0.05;
+/// Choices of the scales that stand for all that the values allow.
+const SAMPLES: usize = 48;
+/// Samples are drawn so much wider than the curvature at the maximum says: the tails are.
+const WIDER: f64 = 1.25;
+
+/// The likelihood of a record in its scales.
+pub(super) struct Search<'a> {
+    pub(super) rows: &'a Rows,
+    pub(super) neighbours: &'a Neighbours,
+    pub(super) own_mps: &'a [f64],
+    /// Mean horizontal wind along show x and y, m/s; where it is not known, the field is taken to stay.
+    pub(super) wind_mps: Option<[f64; 2]>,
+    /// Factor of the prior covariance of the common errors.
+    pub(super) factor: Common,
+}
+
+/// The most probable scales and their uncertainty.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    pub(super) form: Form,
+    pub(super) best: Point,
+    /// Covariance of the scales.
+    pub(super) covariance: SMatrix<f64, SCALES, SCALES>,
+}
+
+/// Scales with their weight.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub(super) point: Point,
+    pub(super) weight: f64,
+}
+
+/// A prior in which the law's constant is not known, nor the updraft that is everywhere the same.
+pub(super) fn open_factor(factor: &Common) -> Common {
+    let mut open = *factor;
+    open[(UNIFORM, UNIFORM)] = UNIFORM_MPS;
+    open
+}
+
+impl Search<'_> {
+    /// The air of a point.
+    pub(super) fn air(&self, form: Form, point: &Point) -> Air {
+        air_of(form, point, self.wind_mps)
+    }
+
+    fn log_posterior(&self, form: Form, point: &Point) -> f64 {
+        let Some(system) = self.system(form, point) else { return f64::NEG_INFINITY };
+        let likelihood = system
+            .posterior(&CommonVector::zeros(), &self.factor)
+            .map_or(f64::NEG_INFINITY, |posterior| posterior.log_likelihood);
+        likelihood + log_prior(point)
+    }
+
+    pub(super) fn system(&self, form: Form, point: &Point) -> Option<System> {
+        if outside(point) > 0.0 {
+            return None;
+        }
+        let covariance = Covariance::new(self.air(form, point));
+        System::new(self.rows, self.neighbours, &covariance, self.own_mps)
+    }
+
+    /// The most probable scales from a start.
+    fn climb(&self, form: Form, start: Point) -> (Point, f64) {
+        let loss = |point: &Point| -self.log_posterior(form, point);
+        minimise(start, loss, |at, value| differences(loss, at, value))
+    }
+
+    /// The most probable scales, over forms and starts.
+    pub(super) fn best(&self) -> Option<Found> {
+        let start = PRIOR.map(|(mean, _)| mean);
+        let starts: Vec<(Form, f64)> = [Form::Exponential, Form::Gaussian]
+            .into_iter()
+            .flat_map(|form| {
+                let drifts: &[f64] = if self.wind_mps.is_some() { &[0.0, 1.0] } else { &[0.5] };
+                drifts.iter().map(move |drift| (form, *drift))
+            })
+            .collect();
+        let climbed: Vec<(Form, Point, f64)> = starts
+            .par_iter()
+            .map(|(form, drift)| {
+                let mut start = start;
+                start[DRIFT] = *drift;
+                let (point, loss) = self.climb(*form, start);
+                (*form, point, -loss)
+            })
+            .collect();
+        let (form, best, log_posterior) = climbed
+            .into_iter()
+            .filter(|(_, _, value)| value.is_finite())
+            .max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let covariance = self.curvature(form, &best, log_posterior)?;
+        Some(Found { form, best, covariance })
+    }
+
+    /// Inverse of the curvature of the posterior at its top.
+    fn curvature(
+        &self,
+        form: Form,
+        best: &Point,
+        top: f64,
+    ) -> Option<SMatrix<f64, SCALES, SCALES>> {
+        let value = |shifts: &[(usize, f64)]| {
+            let mut point = *best;
+            for (index, shift) in shifts {
+                point[*index] += shift * STEP;
+            }
+            self.log_posterior(form, &point)
+        };
+        let pairs: Vec<(usize, usize)> =
+            (0..SCALES).flat_map(|row| (0..=row).map(move |column| (row, column))).collect();
+        let seconds: Vec<f64> = pairs
+            .par_iter()
+            .map(|(row, column)| {
+                let (row, column) = (*row, *column);
+                if row == column {
+                    return (value(&[(row, 1.0)]) + value(&[(row, -1.0)]) - 2.0 * top)
+                        / (STEP * STEP);
+                }
+                let mixed = value(&[(row, 1.0), (column, 1.0)])
+                    + value(&[(row, -1.0), (column, -1.0)])
+                    - value(&[(row, 1.0), (column, -1.0)])
+                    - value(&[(row, -1.0), (column, 1.0)]);
+                mixed / (4.0 * STEP * STEP)
+            })
+            .collect();
+        let mut information = SMatrix::<f64, SCALES, SCALES>::zeros();
+        for ((row, column), second) in pairs.into_iter().zip(seconds) {
+            let second = if second.is_finite() { -second } else { 0.0 };
+            information[(row, column)] = second;
+            information[(column, row)] = second;
+        }
+        // Where a numerical curvature is less than the prior's, the prior's stands.
+        let eigen = information.symmetric_eigen();
+        let mut covariance = SMatrix::<f64, SCALES, SCALES>::zeros();
+        for (index, value) in eigen.eigenvalues.iter().enumerate() {
+            let vector: SVector<f64, SCALES> = eigen.eigenvectors.column(index).into();
+            let prior: f64 =
+                vector.iter().zip(PRIOR).map(|(part, (_, sd))| part * part / (sd * sd)).sum();
+            covariance += vector * vector.transpose() / value.max(prior);
+        }
+        Some(covariance)
+    }
+
+    /// Points that stand for all that the values allow, with weights that add up to one: drawn from the
+    /// curvature at the top, and weighed by `log_weight` of the point, which is its log-posterior.
+    pub(super) fn samples<T: Send>(
+        &self,
+        found: &Found,
+        weigh: impl Fn(&Point) -> Option<(f64, T)> + Sync,
+    ) -> Vec<(Sample, T)> {
+        let Some(factor) = found.covariance.cholesky() else { return Vec::new() };
+        let factor = factor.l();
+        let mut drawn: Vec<(Sample, T)> = (0..SAMPLES)
+            .into_par_iter()
+            .filter_map(|index| {
+                let normal = normals(index);
+                let offset = factor * normal * WIDER;
+                let mut point = found.best;
+                point.iter_mut().zip(offset.iter()).for_each(|(own, by)| *own += by);
+                let (log_posterior, kept) = weigh(&point)?;
+                // The density that it was drawn from, but for a constant.
+                let weight = log_posterior + 0.5 * normal.norm_squared();
+                weight.is_finite().then_some((Sample { point, weight }, kept))
+            })
+            .collect();
+        let most = drawn.iter().map(|(sample, _)| sample.weight).fold(f64::NEG_INFINITY, f64::max);
+        for (sample, _) in &mut drawn {
+            sample.weight = (sample.weight - most).exp();
+        }
+        let sum: f64 = drawn.iter().map(|(sample, _)| sample.weight).sum();
+        for (sample, _) in &mut drawn {
+            sample.weight /= sum;
+        }
+        drawn
+    }
+}
+
+/// The air of a point.
+pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> Air {
+    Air {
+        form,
+        sd_mps: point[LN_SD].exp(),
+        length_m: point[LN_LENGTH].exp(),
+        stretch: [point[STRETCH_ALONG], point[STRETCH_DIAGONAL]],
+        time_s: point[LN_TIME].exp(),
+        drift_mps: wind_mps.map_or([0.0; 2], |wind| wind.map(|part| point[DRIFT] * part)),
+        gust_mps: point[LN_GUST].exp(),
+        gust_s: point[LN_GUST_TIME].exp(),
+    }
+}
+
+/// Logarithm of the prior, but for a constant.
+pub(super) fn log_prior(point: &Point) -> f64 {
+    let each = point.iter().zip(PRIOR).map(|(value, (mean, sd))| ((value - mean) / sd).powi(2));
+    -0.5 * each.sum::<f64>()
+}
+
+/// How far a point is outside of what is looked at, standard deviations of the prior.
+fn outside(point: &Point) -> f64 {
+    let each =
+        point.iter().zip(PRIOR).map(|(value, (mean, sd))| ((value - mean) / sd).abs() - FARTHEST);
+    each.fold(0.0, f64::max)
+}
+
+/// Normal deviates that fill the space evenly: Halton's sequence, mirrored, so that they have no mean.
+fn normals(index: usize) -> SVector<f64, SCALES> {
+    const BASES: [usize; SCALES] = [2, 3, 5, 7, 11, 13, 17, 19];
+    let (half, sign) = (index / 2 + 11, if index % 2 == 0 { 1.0 } else { -1.0 });
+    SVector::from_fn(|row, _| sign * quantile(halton(half, BASES[row])))
+}
+
+fn halton(mut index: usize, base: usize) -> f64 {
+    let (mut value, mut share) = (0.0, 1.0);
+    while index > 0 {
+        share /= base as f64;
+        value += share * (index % base) as f64;
+        index /= base;
+    }
+    value
+}
+
+/// Quantile of the standard normal distribution.
+fn quantile(share: f64) -> f64 {
+    -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * share)
+}

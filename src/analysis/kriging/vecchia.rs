@@ -1,0 +1,206 @@
+//! The likelihood of values by their neighbours, and what it says about everything linear: errors that
+//! all drones share and constants of their own.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, SVector};
+
+use super::covariance::Covariance;
+use super::data::{COMMON, Rows};
+use super::neighbours::{Neighbours, Pattern};
+
+/// Square matrix over the common errors.
+pub(super) type Common = SMatrix<f64, COMMON, COMMON>;
+/// Vector over the common errors.
+pub(super) type CommonVector = SVector<f64, COMMON>;
+
+/// A drone's own constant is not known better than this, m/s. Numerical.
+const LEAST_OWN_MPS: f64 = 2e-3;
+
+/// What the values around a place say about it.
+#[derive(Clone, Debug)]
+pub(super) struct Weights {
+    pub(super) of: Vec<f64>,
+    /// Variance that is left, (m/s)².
+    pub(super) variance: f64,
+}
+
+/// Weights of a pattern; `None` where rounding leaves no positive definite covariance.
+pub(super) fn weights(
+    pattern: &Pattern,
+    covariance: &Covariance,
+    with_noise: bool,
+) -> Option<Weights> {
+    let Pattern { target, neighbours, target_noise_mps, noise_mps } = pattern;
+    let n = neighbours.len();
+    let own = covariance.of(target, target);
+    let own = if with_noise { own + target_noise_mps * target_noise_mps } else { own };
+    if n == 0 {
+        return Some(Weights { of: Vec::new(), variance: own });
+    }
+    let mut matrix = DMatrix::zeros(n, n);
+    for row in 0..n {
+        for column in 0..row {
+            let value = covariance.of(&neighbours[row], &neighbours[column]);
+            matrix[(row, column)] = value;
+            matrix[(column, row)] = value;
+        }
+        matrix[(row, row)] =
+            covariance.of(&neighbours[row], &neighbours[row]) + noise_mps[row] * noise_mps[row];
+    }
+    let to = DVector::from_fn(n, |row, _| covariance.of(target, &neighbours[row]));
+    let of = matrix.cholesky()?.solve(&to);
+    let variance = own - of.dot(&to);
+    (variance > 0.0).then(|| Weights { of: of.as_slice().to_vec(), variance })
+}
+
+/// The likelihood with everything linear left open.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    /// Logarithm of the likelihood at no common error, with the drones' own constants integrated out.
+    log_likelihood: f64,
+    /// Information about the common errors, with the constants integrated out.
+    information: Common,
+    /// Its product with the best values.
+    score: CommonVector,
+    /// The drones' constants: factor of their information with the prior, its product with the common errors, and its
+    /// score.
+    own: Cholesky<f64, Dyn>,
+    own_common: DMatrix<f64>,
+    own_score: DVector<f64>,
+}
+
+/// Common errors after the values were seen.
+#[derive(Clone, Debug)]
+pub(super) struct Posterior {
+    pub(super) mean: CommonVector,
+    pub(super) covariance: Common,
+    /// Logarithm of the values' likelihood.
+    pub(super) log_likelihood: f64,
+}
+
+impl System {
+    /// Of rows with their neighbours before them. `own_mps` are standard errors of the drones' constants.
+    pub(super) fn new(
+        rows: &Rows,
+        neighbours: &Neighbours,
+        covariance: &Covariance,
+        own_mps: &[f64],
+    ) -> Option<Self> {
+        let weights: Option<Vec<Weights>> =
+            neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
+        let weights = weights?;
+        let drones = own_mps.len();
+        let mut information = Common::zeros();
+        let mut score = CommonVector::zeros();
+        let mut own = DMatrix::zeros(drones, drones);
+        let mut own_common = DMatrix::zeros(drones, COMMON);
+        let mut own_score = DVector::zeros(drones);
+        let (mut squares, mut ln_sd) = (0.0, 0.0);
+        let mut constants: Vec<(usize, f64)> = Vec::new();
+        for (index, row) in rows.rows.iter().enumerate() {
+            let Weights { of, variance } = &weights[neighbours.of[index]];
+            let inverse = 1.0 / variance.sqrt();
+            ln_sd -= inverse.ln();
+            let mut value = row.value_mps;
+            let mut common = row.common;
+            constants.clear();
+            constants.push((row.spot.drone.unwrap_or(0), inverse));
+            for (weight, near) in of.iter().zip(&neighbours.rows[index]) {
+                let near = &rows.rows[*near as usize];
+                value -= weight * near.value_mps;
+                for (own, other) in common.iter_mut().zip(&near.common) {
+                    *own -= weight * other;
+                }
+                let drone = near.spot.drone.unwrap_or(0);
+                let by = -weight * inverse;
+                match constants.iter_mut().find(|(known, _)| *known == drone) {
+                    Some((_, factor)) => *factor += by,
+                    None => constants.push((drone, by)),
+                }
+            }
+            value *= inverse;
+            let common = CommonVector::from(common) * inverse;
+            squares += value * value;
+            information.ger(1.0, &common, &common, 1.0);
+            score.axpy(value, &common, 1.0);
+            for (drone, factor) in &constants {
+                own_score[*drone] += factor * value;
+                for column in 0..COMMON {
+                    own_common[(*drone, column)] += factor * common[column];
+                }
+                for (other, other_factor) in &constants {
+                    own[(*drone, *other)] += factor * other_factor;
+                }
+            }
+        }
+        for (drone, sd) in own_mps.iter().enumerate() {
+            let sd = sd.max(LEAST_OWN_MPS);
+            own[(drone, drone)] += 1.0 / (sd * sd);
+            ln_sd += sd.ln();
+        }
+        let own = own.cholesky()?;
+        let ln_own: f64 = own.l_dirty().diagonal().iter().map(|value: &f64| value.ln()).sum();
+        let solved = own.solve(&own_common);
+        let information = information
+            - Common::from_fn(|row, column| own_common.column(row).dot(&solved.column(column)));
+        let score = score - CommonVector::from_fn(|row, _| solved.column(row).dot(&own_score));
+        let squares = squares - own_score.dot(&own.solve(&own_score));
+        let log_likelihood = -ln_sd - 0.5 * squares - ln_own;
+        log_likelihood.is_finite().then_some(Self {
+            log_likelihood,
+            information,
+            score,
+            own,
+            own_common,
+            own_score,
+        })
+    }
+
+    /// The common errors with a prior: their expected values, and a factor `L` of their covariance `L L'`.
+    pub(super) fn posterior(&self, mean: &CommonVector, factor: &Common) -> Option<Posterior> {
+        let pulled = self.score - self.information * mean;
+        let inner = factor.transpose() * self.information * factor + Common::identity();
+        let cholesky = inner.cholesky()?;
+        let score = factor.transpose() * pulled;
+        let solved = cholesky.solve(&score);
+        let ln_inner: f64 =
+            cholesky.l_dirty().diagonal().iter().map(|value: &f64| value.ln()).sum();
+        let at_mean = self.score.dot(mean) - 0.5 * mean.dot(&(self.information * mean));
+        let log_likelihood = self.log_likelihood + at_mean + 0.5 * score.dot(&solved) - ln_inner;
+        Some(Posterior {
+            mean: mean + factor * solved,
+            covariance: factor * cholesky.inverse() * factor.transpose(),
+            log_likelihood,
+        })
+    }
+
+    /// The drones' own constants where the common errors are known, and how they answer these (negated), m/s.
+    pub(super) fn own(&self) -> (DVector<f64>, DMatrix<f64>) {
+        (self.own.solve(&self.own_score), self.own.solve(&self.own_common))
+    }
+
+    /// Covariance of the constants where the common errors are known, (m/s)².
+    pub(super) fn own_covariance(&self) -> DMatrix<f64> {
+        self.own.inverse()
+    }
+}
+
+/// Values less what their neighbours say, in standard deviations: independent and of variance 1 if the covariance is the
+/// air's.
+pub(super) fn innovations(
+    rows: &Rows,
+    neighbours: &Neighbours,
+    covariance: &Covariance,
+    values_mps: &[f64],
+) -> Vec<f64> {
+    let weights: Vec<Option<Weights>> =
+        neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
+    (0..rows.rows.len())
+        .map(|index| {
+            let Some(weights) = &weights[neighbours.of[index]] else { return f64::NAN };
+            let near = weights.of.iter().zip(&neighbours.rows[index]);
+            let expected: f64 =
+                near.map(|(weight, near)| weight * values_mps[*near as usize]).sum();
+            (values_mps[index] - expected) / weights.variance.sqrt()
+        })
+        .collect()
+}

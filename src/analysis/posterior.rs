@@ -1,0 +1,132 @@
+//! The posterior map of a flight ([`super::kriging`]) as part of its result.
+
+use super::drone::Shared;
+use super::kriging::{Calibration, Drone, Input, posterior};
+use super::result::{
+    AirScales, DroneUpdraft, FilledDrone, PosteriorMap, PosteriorScale, UpdraftMap,
+};
+use super::statistics::result::TiltWind;
+use super::truth;
+use super::updraft::DroneSeries;
+use crate::base::estimate::Estimate;
+
+/// Standard errors to each side of a normal 95 % interval.
+const NORMAL: f64 = 1.96;
+
+/// One drone's values at the map's times, as the model sees them.
+pub(super) fn seen(
+    series: &DroneSeries,
+    position_m: Option<[f64; 2]>,
+    track_m: &[Option<[f64; 3]>],
+    times: &[i64],
+) -> Option<Drone> {
+    let measured = series.measured.as_ref()?;
+    let values = series.spread(&measured.modelled, times);
+    let place_m = if track_m.is_empty() {
+        let [x, y] = position_m?;
+        vec![[x, y, series.height_m]]
+    } else {
+        let mut last = track_m.iter().flatten().next().copied()?;
+        track_m
+            .iter()
+            .map(|place| {
+                last = place.unwrap_or(last);
+                last
+            })
+            .collect()
+    };
+    Some(Drone { place_m, values, slope_share: measured.slope_share })
+}
+
+/// Adds the posterior to a map whose drones have places and errors.
+pub(super) fn add(
+    map: &mut UpdraftMap,
+    seen: Vec<Option<Drone>>,
+    shared: &Shared<'_>,
+    wind: Option<&TiltWind>,
+) {
+    let Some(aware) = shared.aware.as_ref() else { return };
+    let (indices, drones): (Vec<usize>, Vec<Drone>) =
+        seen.into_iter().enumerate().filter_map(|(index, drone)| Some((index, drone?))).unzip();
+    if drones.is_empty() || map.is_scan() {
+        return;
+    }
+    let lost = lost(map, shared);
+    let height_m = crate::numeric::median(
+        drones.iter().filter_map(|drone| Some(drone.place_m.first()?[2])).collect(),
+    );
+    let height_m = height_m.unwrap_or_default();
+    let lost_m: Vec<[f64; 3]> = lost.iter().map(|(_, [x, y])| [*x, *y, height_m]).collect();
+    let homes_m = aware.homes_m();
+    let input = Input {
+        drones: &drones,
+        lost_m: &lost_m,
+        seconds: map.time_s.len(),
+        calibration: Calibration::new(&aware.zero.windows, &homes_m),
+        slope: aware.slope(),
+        wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
+    };
+    let Some(found) = posterior(&input) else { return };
+    for (index, series) in indices.into_iter().zip(found.drones) {
+        let Some(drone) = map.drones.get_mut(index) else { continue };
+        drone.posterior_mps = series.mean_mps;
+        drone.posterior_sd_mps = series.sd_mps;
+        drone.posterior_mean = series.over_all.map(|(mean, se)| Estimate::new(mean, se));
+    }
+    let filled = lost
+        .into_iter()
+        .zip(found.lost)
+        .map(|((slot, position_m), series)| FilledDrone {
+            slot,
+            position_m,
+            posterior_mps: series.mean_mps,
+            posterior_sd_mps: series.sd_mps,
+        })
+        .collect();
+    let scale = |scale: super::kriging::Scale| PosteriorScale {
+        value: scale.value,
+        interval: scale.interval,
+    };
+    let adequate = found.adequacy.is_adequate;
+    map.posterior = Some(PosteriorMap {
+        fleet: found.fleet_mps.map(|(mean, se)| Estimate::new(mean, se)),
+        filled,
+        scales: adequate.then(|| AirScales {
+            form: found.air.form.words().to_owned(),
+            sd_mps: found.air.sd_mps,
+            length_m: scale(found.length_m),
+            time_s: scale(found.time_s),
+            drift_mps: found.air.drift_mps,
+            gust_mps: found.air.gust_mps,
+            gust_s: found.air.gust_s,
+        }),
+        no_scales: (!adequate).then(|| found.adequacy.sentence()),
+        zero_shift_mps: found.zero_shift_mps,
+        uniform_probability: found.uniform_probability,
+        truth: truth::check_posterior(&map.drones),
+    });
+}
+
+/// Slots of the plan that the map has not, with their places.
+fn lost(map: &UpdraftMap, shared: &Shared<'_>) -> Vec<(u16, [f64; 2])> {
+    let Some(plan) = shared.input.plan else { return Vec::new() };
+    let has = |slot: u16| map.drones.iter().any(|drone: &DroneUpdraft| drone.slot == Some(slot));
+    plan.slots
+        .iter()
+        .filter(|slot| !has(slot.slot))
+        .map(|slot| (slot.slot, [slot.home_m[0], slot.home_m[1]]))
+        .collect()
+}
+
+/// Mean wind along show x and y, m/s; `None` where its speed or direction is not known.
+fn wind_mps(wind: &TiltWind, shared: &Shared<'_>) -> Option<[f64; 2]> {
+    let (speed, from_deg) = (wind.speed_mps?.value, wind.from_deg?);
+    let to_deg = from_deg + 180.0 - shared.input.plan?.site.orientation_deg;
+    let (sin, cos) = to_deg.to_radians().sin_cos();
+    Some([speed * cos, -speed * sin])
+}
+
+/// Half width of the 95 % interval of a value, m/s.
+pub(super) fn half_mps(sd_mps: f64) -> f64 {
+    NORMAL * sd_mps
+}
