@@ -17,7 +17,8 @@ use std::path::PathBuf;
 
 use foreign_worlds::World;
 use foreign_worlds::air::{Air, AirSettings, FieldSettings, Shear};
-use updraft::blind::scenario::{AirClass, Base, Cell, Protocol, Worlds};
+use updraft::blind::Worlds;
+use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
 use updraft::blind::worlds::draw;
 use updraft::blind::worlds::fly::{Settings, fly_plan};
 use updraft::campaign;
@@ -141,7 +142,7 @@ fn truth(plan: &Plan, world: &World, air_seed: u64) -> String {
             continue;
         };
         let (start, end) = (hover.start_ms as usize / 1000, hover.end_ms as usize / 1000);
-        let place_m = [slot.home_m[0], slot.home_m[1], hover.end_altitude_m];
+        let place_m = [slot.home_m[0], slot.home_m[1], hover.to_m[2]];
         let mut around = air.around(slot.slot);
         let seconds: Vec<f64> = (start * STEPS..end * STEPS)
             .map(|step| around.velocity_mps(place_m, (step as f64 + 0.5) / STEPS as f64)[2])
