@@ -14,11 +14,13 @@
 #![expect(clippy::print_stderr, reason = "it says what went wrong")]
 
 use std::error::Error;
+use std::f64::consts::SQRT_2;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use foreign_worlds::World;
 use foreign_worlds::air::{AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
+use updraft::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
 use updraft::blind::worlds::fly::{Settings, air_of, fly_plan};
 use updraft::blind::worlds::{Worlds, draw};
@@ -92,6 +94,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         fly_plan(&plan, &settings, flight)?;
         if index == 1 {
             std::fs::write(root.join("truth.csv"), truth(&plan, &world, air_seed)?)?;
+            let scales = serde_json::to_string_pretty(&scales(&world.air))?;
+            std::fs::write(root.join("truth-air.json"), scales)?;
         }
     }
     Ok(())
@@ -168,6 +172,29 @@ fn thermal(plan: &Plan, seed: u64, drift_mps: [f64; 2]) -> ThermalSettings {
     };
     let (radius_m, peak_mps) = (draw(3, [12.0, 30.0]), draw(4, [0.8, 2.5]));
     ThermalSettings { profile, core_m, radius_m, peak_mps, drift_mps }
+}
+
+/// The true scales; a foreign field's are those of its correlation's fall to exp(-1/2).
+fn scales(air: &AirSettings) -> TrueAir {
+    let field = air.field.as_ref().map(|field| {
+        let drift_mps = if field.is_advected { air.wind_mps } else { [0.0; 2] };
+        TrueField {
+            sd_mps: field.sd_mps,
+            lambda_m: SQRT_2 * field.length_m,
+            lambda_y_m: SQRT_2 * field.length_m,
+            tau_s: SQRT_2 * field.time_s,
+            wind_mps: drift_mps[0].hypot(drift_mps[1]),
+            is_gaussian: true,
+            drift_mps: Some(drift_mps),
+        }
+    });
+    let gusts = TrueGusts {
+        spectrum: "first order".to_owned(),
+        sd_mps: air.own_mps,
+        length_m: 0.0,
+        time_s: Some(air.own_s),
+    };
+    TrueAir { field, gusts: if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() } }
 }
 
 /// Slots whose log is lost.

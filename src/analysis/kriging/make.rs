@@ -138,7 +138,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
 
 /// Factor of the common errors' covariance: a component's law (none: not known), the doubts, and a uniform
 /// updraft or none.
-fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
+pub(super) fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
     let mut prior = Common::zeros();
     if let Some(component) = component {
         let law = factor(&component.covariance);

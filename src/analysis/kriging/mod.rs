@@ -15,6 +15,7 @@ mod adequacy;
 mod calibration;
 mod covariance;
 mod data;
+mod limit;
 mod make;
 mod neighbours;
 mod predict;
@@ -22,5 +23,7 @@ mod scales;
 mod vecchia;
 
 pub(super) use calibration::Calibration;
+pub(super) use covariance::{Air, Form};
 pub(super) use data::{Drone, Value};
+pub(super) use limit::{Best, best};
 pub(super) use make::{Input, Scale, posterior};
