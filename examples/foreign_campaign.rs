@@ -20,6 +20,7 @@ use std::path::PathBuf;
 
 use foreign_worlds::World;
 use foreign_worlds::air::{AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
+use foreign_worlds::hidden::HiddenEffect;
 use updraft::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
 use updraft::blind::worlds::fly::{Settings, air_of, fly_plan};
@@ -73,7 +74,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         side: 5,
         columns: None,
     };
-    let drawn = draw::world(seed, &cell)?;
+    // Pulses follow the battery's voltage, as those of all controllers do that do not measure it.
+    let voltage = HiddenEffect { kind: "voltage".to_owned(), values: vec![1.0] };
+    let mut drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
+    if !kind.starts_with("noisy") {
+        // Noise of pulses that lasts for seconds cannot be told from gusts of a drone's own: only one kind has it.
+        drawn.noise.pulse_coloured_us = 0.0;
+    }
     for (index, flight) in campaign::flights(&root)?.iter().enumerate() {
         let plan = flight.read_plan()?;
         let mut air = air(kind, index).ok_or("this kind of air is not known")?;
@@ -125,6 +132,7 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
         "still" => still,
         "field" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "gusty" => AirSettings { field: field(0.5, 145.0, 186.0, false), own_mps: 0.25, ..still },
+        "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }

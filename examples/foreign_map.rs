@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-const HEAD: &str = "                     zero  plain inside | found   bias  rest inside width means |  limit   at it ratio | length time";
+const HEAD: &str = "                     zero  plain inside | found   bias  rest inside width means filled  rms |  limit   at it ratio | length time";
 
 /// What one campaign gave.
 #[derive(Clone, Copy, Default)]
@@ -58,6 +58,8 @@ struct Row {
     inside: f64,
     width: f64,
     means_inside: f64,
+    filled_rms: f64,
+    filled_inside: f64,
     limit: f64,
     at_limit: f64,
     length_inside: f64,
@@ -68,19 +70,21 @@ struct Row {
 impl Row {
     fn words(&self) -> String {
         let Self { zero, plain, rms, bias, rest, limit, at_limit, .. } = self;
-        let [plain_inside, inside, means, length, time, scales] = [
+        let [plain_inside, inside, means, filled, length, time, scales] = [
             self.plain_inside,
             self.inside,
             self.means_inside,
+            self.filled_inside,
             self.length_inside,
             self.time_inside,
             self.has_scales,
         ]
         .map(|share| 100.0 * share);
         format!(
-            "{zero:6.3} {plain:6.3} {plain_inside:5.1} | {rms:6.3} {bias:6.3} {rest:5.3} {inside:5.1} {:5.2} {means:5.1} | {limit:6.3} \
+            "{zero:6.3} {plain:6.3} {plain_inside:5.1} | {rms:6.3} {bias:6.3} {rest:5.3} {inside:5.1} {:5.2} {means:5.1} {filled:5.1} {:5.3} | {limit:6.3} \
              {at_limit:6.3} {:5.2} | {length:4.0} {time:4.0} of {scales:3.0}",
             self.width,
+            self.filled_rms,
             at_limit / limit,
         )
     }
@@ -102,6 +106,8 @@ impl Row {
             inside: mean(|row| row.inside),
             width: square(|row| row.width * row.rms) / square(|row| row.rms),
             means_inside: mean(|row| row.means_inside),
+            filled_rms: square(|row| row.filled_rms),
+            filled_inside: mean(|row| row.filled_inside),
             limit: square(|row| row.limit),
             at_limit: square(|row| row.at_limit),
             length_inside: mean(|row| row.length_inside) / scales,
@@ -135,6 +141,21 @@ fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
         .collect();
     let width =
         (sds.iter().map(|sd| sd * sd).sum::<f64>() / sds.len() as f64).sqrt() / truth.rms_mps;
+    let mut filled: Vec<(f64, bool)> = Vec::new();
+    for place in &posterior.filled {
+        let Some(series) = work.flights.last().and_then(|flight| flight.truth.get(&place.slot))
+        else {
+            continue;
+        };
+        let values = place.posterior_mps.iter().zip(&place.posterior_sd_mps);
+        for (time_s, (value, sd)) in map.time_s.iter().zip(values) {
+            let Some(((value, sd), truth)) = value.zip(*sd).zip(series.at_second(*time_s as i64))
+            else {
+                continue;
+            };
+            filled.push((value - truth, (value - truth).abs() < 1.96 * sd));
+        }
+    }
     let scales = posterior.scales.as_ref();
     let field = known.and_then(|air| air.field);
     let holds = |interval: Option<[f64; 2]>, value: Option<f64>| {
@@ -152,6 +173,11 @@ fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
         inside: truth.inside_share,
         width,
         means_inside: truth.means_inside_share,
+        filled_rms: (filled.iter().map(|(error, _)| error * error).sum::<f64>()
+            / filled.len() as f64)
+            .sqrt(),
+        filled_inside: filled.iter().filter(|(_, inside)| *inside).count() as f64
+            / filled.len() as f64,
         limit: truth.limit_rms_mps.unwrap_or(f64::NAN),
         at_limit: truth.at_limit_rms_mps.unwrap_or(f64::NAN),
         length_inside: holds(

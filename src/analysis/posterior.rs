@@ -4,7 +4,7 @@ use super::budget::TruthCheck;
 use super::drone::Shared;
 use super::kriging::{Air, Calibration, Drone, Form, Input, best, posterior};
 use super::result::{
-    AirScales, DroneUpdraft, FilledDrone, PosteriorMap, PosteriorScale, UpdraftMap,
+    AirScales, DroneUpdraft, FilledDrone, PosteriorGrid, PosteriorMap, PosteriorScale, UpdraftMap,
 };
 use super::statistics::result::{TiltWind, TrueAir};
 use super::truth;
@@ -91,6 +91,18 @@ pub(super) fn add(
     };
     let adequate = found.adequacy.is_adequate;
     map.posterior = Some(PosteriorMap {
+        grid: found.grid.map(|grid| PosteriorGrid {
+            time_s: grid
+                .seconds
+                .iter()
+                .filter_map(|second| map.time_s.get(*second).copied())
+                .collect(),
+            x_m: grid.x_m,
+            y_m: grid.y_m,
+            height_m: grid.height_m,
+            updraft_mps: grid.mean_mps,
+            sd_mps: grid.sd_mps,
+        }),
         fleet: found.fleet_mps.map(|(mean, se)| Estimate::new(mean, se)),
         filled,
         scales: adequate.then(|| AirScales {

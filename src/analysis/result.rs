@@ -302,6 +302,9 @@ pub struct PosteriorMap {
     /// The air where the plan has a drone and the flight has no values.
     #[serde(default)]
     pub filled: Vec<FilledDrone>,
+    /// The air between the drones, every 10 s; absent: they moved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<PosteriorGrid>,
     /// Scales of the air; absent: no stationary field describes it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scales: Option<AirScales>,
@@ -316,6 +319,23 @@ pub struct PosteriorMap {
     /// Comparison of the posterior with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+}
+
+/// The air on a grid over the fleet: posterior means of the 10 s around a time, with their standard deviations.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PosteriorGrid {
+    /// Show times, s.
+    pub time_s: Vec<f64>,
+    /// Columns in the show frame (x forward), m.
+    pub x_m: Vec<f64>,
+    /// Rows in the show frame (y left), m.
+    pub y_m: Vec<f64>,
+    /// Height above home, m.
+    pub height_m: f64,
+    /// By time, row and column, m/s, up positive; null: nothing is known there.
+    pub updraft_mps: Vec<Vec<Vec<Option<f64>>>>,
+    /// Standard deviations likewise, all origins of error included, m/s.
+    pub sd_mps: Vec<Vec<Vec<Option<f64>>>>,
 }
 
 /// The air at a place of the plan without values.

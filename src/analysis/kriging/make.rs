@@ -4,6 +4,7 @@ use super::adequacy::{Adequacy, judge};
 use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
 use super::data::{Drone, Rows, UNIFORM};
+use super::grid::{Grid, grid};
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
 use super::scales::{
@@ -56,6 +57,8 @@ pub(in super::super) struct Posterior {
     pub(in super::super) drones: Vec<Series>,
     /// At the places without a log.
     pub(in super::super) lost: Vec<Series>,
+    /// Between them; `None` for fleets that move.
+    pub(in super::super) grid: Option<Grid>,
     /// Mean over all drones and seconds with its standard error, m/s.
     pub(in super::super) fleet_mps: Option<(f64, f64)>,
     pub(in super::super) air: Air,
@@ -124,6 +127,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     }
     let zero_shift_mps = shift(&model, &rows);
     Some(Posterior {
+        grid: grid(&model, input.lost_m, first),
         fleet_mps: model.fleet(&rows),
         drones,
         lost,

@@ -15,6 +15,7 @@ mod adequacy;
 mod calibration;
 mod covariance;
 mod data;
+mod grid;
 mod limit;
 mod make;
 mod neighbours;
