@@ -18,9 +18,12 @@ const STRENGTHS: [(f64, f64); 5] = [(0.45, 0.1), (0.7, 0.2), (1.0, 0.4), (1.4, 0
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
 /// White scatter of the windows' averages besides their noise, us. A grid.
-const WHITES_US: [f64; 3] = [0.1, 0.5, 2.0];
+const WHITES_US: [f64; 3] = [0.3, 1.0, 3.0];
 /// Pairs of drones whose distances stand for those of all.
-const PAIRS: usize = 24;
+const PAIRS: usize = 12;
+/// Nodes of the mean over a window, as shares of its length from its middle on, with their weights (Gauss and Legendre).
+const NODES: [(f64, f64); 3] =
+    [(-0.387_298_335, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_335, 5.0 / 18.0)];
 
 /// The law of the fleet in air of one kind.
 #[derive(Clone, Debug)]
@@ -31,6 +34,14 @@ pub(super) struct Component {
     pub(super) covariance: DMatrix<f64>,
     /// Logarithm of the likelihood of the windows with the choice's own weight.
     pub(super) log_weight: f64,
+}
+
+impl CellAt {
+    /// Time and height at a share of the window's length from its middle on.
+    fn at(&self, share: f64) -> (f64, f64) {
+        let by_s = share * self.span_s;
+        (self.time_s + by_s, self.height_m + by_s * self.climb_mps)
+    }
 }
 
 /// The windows of a calibration with where the drones were.
@@ -68,19 +79,26 @@ impl<'a> Calibration<'a> {
         other: &CellAt,
         taller: f64,
     ) -> (f64, f64) {
-        let dt = one.time_s - other.time_s;
-        let dz = (one.height_m - other.height_m) / taller;
-        let own = covariance.field([0.0, 0.0, dz], dt);
-        let gusts = covariance.gusts(dt);
+        let gusts = covariance.gusts(one.time_s - other.time_s);
+        let over = |x_m: f64, y_m: f64| {
+            let mut sum = 0.0;
+            for (at, weight) in NODES {
+                for (other_at, other_weight) in NODES {
+                    let (time_s, height_m) = one.at(at);
+                    let (other_s, other_m) = other.at(other_at);
+                    let apart_m = [x_m, y_m, (height_m - other_m) / taller];
+                    sum += weight * other_weight * covariance.instant(apart_m, time_s - other_s);
+                }
+            }
+            sum
+        };
+        let own = over(0.0, 0.0);
         if self.pairs_m.is_empty() {
             return (own + gusts, 0.0);
         }
-        let mut sum = 0.0;
-        for [x, y] in &self.pairs_m {
-            sum +=
-                0.5 * (covariance.field([*x, *y, dz], dt) + covariance.field([-*x, -*y, dz], dt));
-        }
-        let apart = sum / self.pairs_m.len() as f64;
+        let each =
+            self.pairs_m.iter().map(|[x_m, y_m]| 0.5 * (over(*x_m, *y_m) + over(-x_m, -y_m)));
+        let apart = each.sum::<f64>() / self.pairs_m.len() as f64;
         let share = 1.0 / self.drones;
         (share * (own + gusts) + (1.0 - share) * apart, (own + gusts - apart).max(0.0))
     }

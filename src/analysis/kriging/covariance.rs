@@ -114,6 +114,18 @@ impl Covariance {
         variance * sum
     }
 
+    /// Covariance of the field at two instants, (m/s)².
+    pub(super) fn instant(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
+        let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
+        let moved = [apart_m[0] - u * apart_s, apart_m[1] - v * apart_s, apart_m[2]];
+        let (r, t) = (self.distance(moved), apart_s.abs() / time_s);
+        let correlation = match form {
+            Form::Exponential => (-r - t).exp(),
+            Form::Gaussian => (-r * r - t * t).exp(),
+        };
+        sd_mps * sd_mps * correlation
+    }
+
     /// Covariance of a drone's own gusts, (m/s)².
     pub(super) fn gusts(&self, apart_s: f64) -> f64 {
         self.air.gust_mps.powi(2) * mean_exponential(apart_s, self.air.gust_s)
