@@ -1,6 +1,7 @@
 //! The posterior map of a flight ([`super::kriging`]) as part of its result.
 
 use super::budget::TruthCheck;
+use super::corrections::{DENSITY, WIND};
 use super::drone::Shared;
 use super::kriging::{Air, Calibration, Drone, Form, Input, best, posterior};
 use super::result::{
@@ -10,6 +11,7 @@ use super::statistics::result::{TiltWind, TrueAir};
 use super::truth;
 use super::updraft::DroneSeries;
 use crate::base::estimate::Estimate;
+use crate::numeric::mean;
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
@@ -47,11 +49,12 @@ pub(super) fn add(
     wind: Option<&TiltWind>,
 ) {
     let Some(aware) = shared.aware.as_ref() else { return };
-    let (indices, drones): (Vec<usize>, Vec<Drone>) =
+    let (indices, mut drones): (Vec<usize>, Vec<Drone>) =
         seen.into_iter().enumerate().filter_map(|(index, drone)| Some((index, drone?))).unzip();
     if drones.is_empty() || map.is_scan() {
         return;
     }
+    share_law(&mut drones);
     let lost = lost(map, shared);
     let height_m = crate::numeric::median(
         drones.iter().filter_map(|drone| Some(drone.place_m.first()?[2])).collect(),
@@ -167,6 +170,23 @@ const STILL: Air = Air {
     gust_mps: 0.0,
     gust_s: 1.0,
 };
+
+/// Gives all values the fleet's mean of what an error of its law adds to them.
+///
+/// What it adds to one drone's differs by that drone's own slope and mean, which are known with errors. Hundreds of smooth
+/// values would take these for a pattern over the fleet, and tell an updraft that is everywhere the same from an error of
+/// the zero by it, which nothing can.
+fn share_law(drones: &mut [Drone]) {
+    let known = || drones.iter().flat_map(|drone| drone.values.iter().flatten());
+    let law =
+        std::array::from_fn(|index| mean(known().map(|value| value.law[index])).unwrap_or(0.0));
+    let steady = [WIND, DENSITY]
+        .map(|doubt| (doubt, mean(known().map(|value| value.doubts_mps[doubt])).unwrap_or(0.0)));
+    for value in drones.iter_mut().flat_map(|drone| drone.values.iter_mut().flatten()) {
+        value.law = law;
+        steady.iter().for_each(|(doubt, mps)| value.doubts_mps[*doubt] = *mps);
+    }
+}
 
 /// Slots of the plan that the map has not, with their places.
 fn lost(map: &UpdraftMap, shared: &Shared<'_>) -> Vec<(u16, [f64; 2])> {

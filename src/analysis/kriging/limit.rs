@@ -35,7 +35,7 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>
     }
     let n = rows.rows.len();
     let covariances: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
-    let component = input.calibration.known(&covariances)?;
+    let component = input.calibration.known(air)?;
     let own_us: f64 = air.iter().map(|air| input.calibration.own_us(air).powi(2)).sum();
     let own_mps = own_us.sqrt() / input.slope.max(1.0);
     let mut of_air = DMatrix::zeros(n, n);
