@@ -12,15 +12,21 @@
 //! ([`calibration`]); and the map is the posterior mean with its standard deviation ([`predict`]).
 
 mod adequacy;
+mod along;
 mod calibration;
 mod covariance;
 mod data;
 mod make;
+mod moving;
+#[cfg(test)]
+mod moving_tests;
 mod neighbours;
 mod predict;
 mod scales;
+mod thermals;
 mod vecchia;
 
 pub(super) use calibration::Calibration;
 pub(super) use data::{Drone, Value};
 pub(super) use make::{Input, Scale, posterior};
+pub(super) use thermals::{Known, Thermal};
