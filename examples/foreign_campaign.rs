@@ -14,13 +14,16 @@
 #![expect(clippy::print_stderr, reason = "it says what went wrong")]
 
 use std::error::Error;
+use std::f64::consts::SQRT_2;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use foreign_worlds::World;
-use foreign_worlds::air::{Air, AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
+use foreign_worlds::air::{AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
+use foreign_worlds::hidden::HiddenEffect;
+use updraft::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
-use updraft::blind::worlds::fly::{Settings, fly_plan};
+use updraft::blind::worlds::fly::{Settings, air_of, fly_plan};
 use updraft::blind::worlds::{Worlds, draw};
 use updraft::campaign;
 use updraft::mission::Plan;
@@ -71,7 +74,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         side: 5,
         columns: None,
     };
-    let drawn = draw::world(seed, &cell)?;
+    // Pulses follow the battery's voltage, as those of all controllers do that do not measure it.
+    let voltage = HiddenEffect { kind: "voltage".to_owned(), values: vec![1.0] };
+    let drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
     for (index, flight) in campaign::flights(&root)?.iter().enumerate() {
         let plan = flight.read_plan()?;
         let mut air = air(kind, index).ok_or("this kind of air is not known")?;
@@ -92,6 +97,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         fly_plan(&plan, &settings, flight)?;
         if index == 1 {
             std::fs::write(root.join("truth.csv"), truth(&plan, &world, air_seed)?)?;
+            let scales = serde_json::to_string_pretty(&scales(&world.air))?;
+            std::fs::write(root.join("truth-air.json"), scales)?;
         }
     }
     Ok(())
@@ -170,6 +177,29 @@ fn thermal(plan: &Plan, seed: u64, drift_mps: [f64; 2]) -> ThermalSettings {
     ThermalSettings { profile, core_m, radius_m, peak_mps, drift_mps }
 }
 
+/// The true scales; a foreign field's are those of its correlation's fall to exp(-1/2).
+fn scales(air: &AirSettings) -> TrueAir {
+    let field = air.field.as_ref().map(|field| {
+        let drift_mps = if field.is_advected { air.wind_mps } else { [0.0; 2] };
+        TrueField {
+            sd_mps: field.sd_mps,
+            lambda_m: SQRT_2 * field.length_m,
+            lambda_y_m: SQRT_2 * field.length_m,
+            tau_s: SQRT_2 * field.time_s,
+            wind_mps: drift_mps[0].hypot(drift_mps[1]),
+            is_gaussian: true,
+            drift_mps: Some(drift_mps),
+        }
+    });
+    let gusts = TrueGusts {
+        spectrum: "first order".to_owned(),
+        sd_mps: air.own_mps,
+        length_m: 0.0,
+        time_s: Some(air.own_s),
+    };
+    TrueAir { field, gusts: if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() } }
+}
+
 /// Slots whose log is lost.
 fn missing(plan: &Plan, seed: u64) -> Vec<u16> {
     let mut slots: Vec<(u64, u16)> =
@@ -191,8 +221,7 @@ fn mixed(value: u64) -> u64 {
 /// a table.
 fn truth(plan: &Plan, world: &World, air_seed: u64) -> Result<String, Box<dyn Error>> {
     let mut text = "slot,time_s,w10_mps\n".to_owned();
-    let end_s = plan.duration_ms as f64 / 1000.0;
-    let air = Air::new(&world.air, [-30.0, end_s + 90.0], air_seed);
+    let air = air_of(plan, &world.air, air_seed)?;
     let show = plan.to_show();
     for (slot, drone) in plan.slots.iter().zip(&show.drones) {
         let measures = |kind| matches!(kind, SegmentKind::Hover | SegmentKind::Horizontal);

@@ -1,11 +1,12 @@
 //! The posterior map of a flight ([`super::kriging`]) as part of its result.
 
+use super::budget::TruthCheck;
 use super::drone::Shared;
-use super::kriging::{Calibration, Drone, Input, posterior};
+use super::kriging::{Air, Calibration, Drone, Form, Input, best, posterior};
 use super::result::{
     AirScales, DroneUpdraft, FilledDrone, PosteriorMap, PosteriorScale, UpdraftMap,
 };
-use super::statistics::result::TiltWind;
+use super::statistics::result::{TiltWind, TrueAir};
 use super::thermal::Thermal;
 use super::truth;
 use super::updraft::DroneSeries;
@@ -69,6 +70,7 @@ pub(super) fn add(
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
     let Some(found) = posterior(&input) else { return };
+    let places = indices.clone();
     for (index, series) in indices.into_iter().zip(found.drones) {
         let Some(drone) = map.drones.get_mut(index) else { continue };
         drone.posterior_mps = series.mean_mps;
@@ -107,9 +109,56 @@ pub(super) fn add(
         no_scales: (!adequate).then(|| found.adequacy.sentence()),
         zero_shift_mps: found.zero_shift_mps,
         uniform_probability: found.uniform_probability,
-        truth: truth::check_posterior(&map.drones),
+        truth: truth::check_posterior(&map.drones).map(|check| {
+            let best = known_air(shared).and_then(|air| best(&input, &air));
+            let at_limit = best.and_then(|best| truth::at_limit(&map.drones, &places, &best));
+            TruthCheck {
+                limit_rms_mps: at_limit.map(|[limit, _]| limit),
+                at_limit_rms_mps: at_limit.map(|[_, own]| own),
+                ..check
+            }
+        }),
     });
 }
+
+/// The parts of the air that a flight was simulated in, where the covariances of all are known.
+fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
+    let TrueAir { field, gusts } = shared.input.true_air?;
+    let mut parts = Vec::new();
+    if let Some(field) = field {
+        parts.push(Air {
+            form: if field.is_gaussian { Form::Gaussian } else { Form::Exponential },
+            sd_mps: field.sd_mps,
+            length_m: (field.lambda_m * field.lambda_y_m).sqrt(),
+            stretch: [0.5 * (field.lambda_m / field.lambda_y_m).ln(), 0.0],
+            time_s: field.tau_s,
+            drift_mps: match field.drift_mps {
+                Some(drift_mps) => drift_mps,
+                None if field.wind_mps == 0.0 => [0.0; 2],
+                None => return None,
+            },
+            gust_mps: 0.0,
+            gust_s: 1.0,
+        });
+    }
+    for gust in gusts {
+        let still = Air { gust_mps: gust.sd_mps, gust_s: gust.time_s?, ..STILL };
+        parts.push(still);
+    }
+    (!parts.is_empty()).then_some(parts)
+}
+
+/// Air without a field.
+const STILL: Air = Air {
+    form: Form::Exponential,
+    sd_mps: 0.0,
+    length_m: 1.0,
+    stretch: [0.0; 2],
+    time_s: 1.0,
+    drift_mps: [0.0; 2],
+    gust_mps: 0.0,
+    gust_s: 1.0,
+};
 
 /// Slots of the plan that the map has not, with their places.
 fn lost(map: &UpdraftMap, shared: &Shared<'_>) -> Vec<(u16, [f64; 2])> {

@@ -88,7 +88,7 @@ impl<'a> Calibration<'a> {
     /// The fleet's law under all that is left open in air of these scales.
     pub(super) fn components(&self, air: &Air) -> Vec<Component> {
         let covariance = Covariance::new(*air);
-        let Windows { record, cells, parameters } = self.windows;
+        let cells = &self.windows.cells;
         let mut found = Vec::new();
         for (taller, tall_weight) in TALLER {
             let shared = DMatrix::from_fn(cells.len(), cells.len(), |row, column| {
@@ -103,20 +103,38 @@ impl<'a> Calibration<'a> {
                     let air = |row: usize, column: usize| {
                         strength * strength * shared[(row.max(column), row.min(column))]
                     };
-                    let Some(fit) = record.fit_in(air, white_us) else { continue };
-                    let Gls { gain, covariance, log_likelihood } = fit;
-                    let law = gain * &record.pulse_us;
-                    let mut shift = [0.0; PARAMETERS];
-                    shift
-                        .iter_mut()
-                        .zip(law.iter().zip(parameters))
-                        .for_each(|(shift, (law, used))| *shift = law - used);
-                    let log_weight = log_likelihood + (weight * tall_weight).ln();
-                    found.push(Component { shift, covariance, log_weight });
+                    found.extend(self.component(air, white_us, (weight * tall_weight).ln()));
                 }
             }
         }
         found
+    }
+
+    /// The fleet's law in air of known scales, alike in all directions and as strong as they say.
+    pub(super) fn known(&self, air: &[Covariance]) -> Option<Component> {
+        let cells = &self.windows.cells;
+        let shared = |row: usize, column: usize| {
+            air.iter().map(|part| self.air(part, &cells[row], &cells[column], 1.0).0).sum()
+        };
+        self.component(shared, WHITES_US[0], 0.0)
+    }
+
+    /// The fleet's law in air with a covariance between windows; `None` where they do not determine it.
+    fn component(
+        &self,
+        air: impl Fn(usize, usize) -> f64,
+        white_us: f64,
+        ln_weight: f64,
+    ) -> Option<Component> {
+        let Windows { record, parameters, .. } = self.windows;
+        let Gls { gain, covariance, log_likelihood } = record.fit_in(air, white_us)?;
+        let law = gain * &record.pulse_us;
+        let mut shift = [0.0; PARAMETERS];
+        shift
+            .iter_mut()
+            .zip(law.iter().zip(parameters))
+            .for_each(|(shift, (law, used))| *shift = law - used);
+        Some(Component { shift, covariance, log_weight: log_likelihood + ln_weight })
     }
 
     /// Standard error of one drone's constant against the fleet's by air that it met alone, us.

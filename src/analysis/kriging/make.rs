@@ -106,9 +106,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
             found = search.best()?;
         }
     }
-    let thermals =
-        Record { search: &search, neighbours: &all, found: &found, wind_mps: input.wind_mps }
-            .thermals();
+    let thermals = XX;
     let air = search.air(found.form, &found.best);
     // Air that each drone met alone in its calibration is in its constant.
     let own = input.calibration.own_us(&air) / input.slope.max(1.0);
@@ -162,7 +160,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
 
 /// Factor of the common errors' covariance: a component's law (none: not known), the doubts, and a uniform
 /// updraft or none.
-fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
+pub(super) fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
     let mut prior = Common::zeros();
     if let Some(component) = component {
         let law = factor(&component.covariance);

@@ -16,6 +16,7 @@ mod along;
 mod calibration;
 mod covariance;
 mod data;
+mod limit;
 mod make;
 mod moving;
 #[cfg(test)]
@@ -27,6 +28,8 @@ mod thermals;
 mod vecchia;
 
 pub(super) use calibration::Calibration;
+pub(super) use covariance::{Air, Form};
 pub(super) use data::{Drone, Value};
+pub(super) use limit::{Best, best};
 pub(super) use make::{Input, Scale, posterior};
 pub(super) use thermals::{Known, Thermal};

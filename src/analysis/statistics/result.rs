@@ -71,6 +71,17 @@ pub struct TrueField {
     pub tau_s: f64,
     /// Wind that carries the field past the drones, m/s.
     pub wind_mps: f64,
+    /// Whether the correlation is Gaussian, `exp(-(r / lambda)² - (dt / tau)²)`, instead of exponential.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_gaussian: bool,
+    /// The same wind along x and y of the show frame, m/s; absent: its direction is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift_mps: Option<[f64; 2]>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Gusts with a length of their own.
@@ -82,6 +93,9 @@ pub struct TrueGusts {
     pub sd_mps: f64,
     /// Integral length, m.
     pub length_m: f64,
+    /// Correlation time of each drone's own gusts (1/e), s; absent: what the wind makes of the length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
 }
 
 /// The data that the statistics are made of.

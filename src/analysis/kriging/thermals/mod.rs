@@ -26,8 +26,9 @@ use whiten::Whitening;
 
 /// Thermals that are looked for, at most. Chosen.
 const MOST: usize = 4;
-/// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again.
-const WORTH: f64 = 5.0;
+/// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again. Neighbours
+/// stand for all values, and forms for the field's own: fields without a thermal reach 9 (docs/errors.md).
+const WORTH: f64 = 12.0;
 /// In the scales that were found without it, a thermal must come so near to being worth it, nats, to be followed.
 const WORTH_A_LOOK: f64 = -6.0;
 /// Rounds in which scales and thermal are found again.

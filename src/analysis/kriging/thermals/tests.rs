@@ -157,7 +157,9 @@ fn made(seed: u64, fleet: Fleet, air: Air, truth: Option<Truth>) -> (Vec<Drone>,
         let own = if row == column { NOISE_MPS * NOISE_MPS } else { 0.0 };
         own + covariance.of(&rows.rows[row].spot, &rows.rows[column].spot)
     });
-    let factor = matrix.cholesky().unwrap().l();
+    // Sums over few nodes are no exact covariance: what is missing is noise.
+    let jitter = DMatrix::identity(count, count) * (0.1 * air.sd_mps).powi(2);
+    let factor = matrix.clone().cholesky().or_else(|| (matrix + jitter).cholesky()).unwrap().l();
     let drawn = factor * DVector::from_fn(count, |_, _| normal());
     let own: Vec<f64> = drones.iter().map(|_| OWN_MPS * normal()).collect();
     for (row, air_mps) in rows.rows.iter_mut().zip(drawn.iter()) {
