@@ -45,3 +45,61 @@ pub(super) fn along(
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::kriging::covariance::{Air, Form};
+
+    fn covariance(form: Form, drift_mps: [f64; 2]) -> Covariance {
+        Covariance::new(Air {
+            form,
+            sd_mps: 0.5,
+            length_m: 60.0,
+            stretch: [0.0; 2],
+            time_s: 100.0,
+            drift_mps,
+            gust_mps: 0.0,
+            gust_s: 4.0,
+        })
+    }
+
+    #[test]
+    fn means_along_tracks_have_the_covariance_that_sums_say() {
+        let east = [4.0, 0.0, 0.0];
+        for form in [Form::Exponential, Form::Gaussian] {
+            for drift_mps in [[0.0; 2], [1.5, -0.5]] {
+                let covariance = covariance(form, drift_mps);
+                for (apart_m, apart_s, velocities) in [
+                    ([0.0; 3], 0.0, [east, east]),
+                    ([0.0, 10.0, 0.0], 0.0, [east, east]),
+                    ([-40.0, 0.0, 0.0], -10.0, [east, east]),
+                    ([15.0, 10.0, 20.0], 60.0, [east, [-4.0, 0.0, 0.0]]),
+                    ([30.0, 0.0, 0.0], 20.0, [east, [0.0; 3]]),
+                ] {
+                    let [one_mps, other_mps] = velocities;
+                    let steps = 80;
+                    let at =
+                        |step: i32| ((f64::from(step) + 0.5) / f64::from(steps) - 0.5) * RUNNING_S;
+                    let mut sum = 0.0;
+                    for one in 0..steps {
+                        for other in 0..steps {
+                            let moved = [0, 1, 2].map(|axis| {
+                                apart_m[axis] + one_mps[axis] * at(one)
+                                    - other_mps[axis] * at(other)
+                            });
+                            sum += covariance.instant(moved, apart_s + at(one) - at(other));
+                        }
+                    }
+                    let expected = sum / f64::from(steps * steps);
+                    let found = along(&covariance, apart_m, apart_s, velocities);
+                    // Of a variance of 0.25.
+                    assert!(
+                        (found - expected).abs() < 2.5e-3,
+                        "{form:?} {drift_mps:?} {apart_m:?}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -289,6 +289,34 @@ fn seeds(default: u64) -> std::ops::Range<u64> {
 }
 
 #[test]
+fn a_thermal_is_found_where_it_is() {
+    let quiet = air(Form::Exponential, 0.15, 60.0, 60.0);
+    let drift_mps = [0.8, 0.3];
+    for seed in 0..2 {
+        let truth = truth(seed, HOVER, drift_mps);
+        let (drones, rows) = made(seed, HOVER, quiet, Some(truth));
+        let found = looked_for(&drones, &rows, Some([0.9, 0.2]));
+        let one = found.first().unwrap();
+        for axis in 0..2 {
+            let core_m = truth.core_m[axis] + truth.drift_mps[axis] * one.at_s;
+            let off_m = one.core_m[axis].0 - core_m;
+            assert!(off_m.abs() < 2.0, "{seed}: {off_m} {truth:?} {one:?}");
+        }
+        let off = one.peak_mps.0 / truth.peak_mps - 1.0;
+        assert!(off.abs() < 0.2, "{seed}: {off} {truth:?} {one:?}");
+    }
+}
+
+#[test]
+fn a_stationary_field_has_no_thermal() {
+    for form in [Form::Exponential, Form::Gaussian] {
+        let (drones, rows) = made(0, HOVER, air(form, 0.5, 80.0, 100.0), None);
+        let found = looked_for(&drones, &rows, None);
+        assert!(found.is_empty(), "{form:?}: {found:?}");
+    }
+}
+
+#[test]
 #[ignore = "minutes: UPDRAFT_SEEDS=100 cargo test --release --lib kriging::thermals -- --ignored --nocapture"]
 fn many_thermals_and_none() {
     let quiet = air(Form::Exponential, 0.15, 60.0, 60.0);
