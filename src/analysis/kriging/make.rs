@@ -106,7 +106,9 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
             found = search.best()?;
         }
     }
-    let thermals = XX;
+    let record =
+        Record { search: &search, drones: input.drones, found: &found, wind_mps: input.wind_mps };
+    let thermals = record.thermals();
     let air = search.air(found.form, &found.best);
     // Air that each drone met alone in its calibration is in its constant.
     let own = input.calibration.own_us(&air) / input.slope.max(1.0);
