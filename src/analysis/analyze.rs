@@ -573,6 +573,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         truth: truth::check(&drones),
         drones,
         posterior: None,
+        thermals: Vec::new(),
     };
     (map, modelled)
 }

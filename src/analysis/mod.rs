@@ -50,6 +50,7 @@ pub mod statistics;
 mod stats;
 pub mod steps;
 pub mod table;
+pub mod thermal;
 pub mod together;
 mod track;
 mod truth;

@@ -8,6 +8,7 @@ use super::result::{
     AirScales, DroneUpdraft, FilledDrone, PosteriorGrid, PosteriorMap, PosteriorScale, UpdraftMap,
 };
 use super::statistics::result::{TiltWind, TrueAir};
+use super::thermal::Thermal;
 use super::truth;
 use super::updraft::DroneSeries;
 use crate::base::estimate::Estimate;
@@ -51,11 +52,12 @@ pub(super) fn add(
     let Some(aware) = shared.aware.as_ref() else { return };
     let (indices, mut drones): (Vec<usize>, Vec<Drone>) =
         seen.into_iter().enumerate().filter_map(|(index, drone)| Some((index, drone?))).unzip();
-    if drones.is_empty() || map.is_scan() {
+    if drones.is_empty() {
         return;
     }
     share_law(&mut drones);
-    let lost = lost(map, shared);
+    // Where a drone that is lost would have been in a scan, others come by.
+    let lost = if map.is_scan() { Vec::new() } else { lost(map, shared) };
     let height_m = crate::numeric::median(
         drones.iter().filter_map(|drone| Some(drone.place_m.first()?[2])).collect(),
     );
@@ -92,6 +94,8 @@ pub(super) fn add(
         value: scale.value,
         interval: scale.interval,
     };
+    let first_s = map.time_s.first().copied().unwrap_or_default();
+    map.thermals = found.thermals.iter().map(|one| Thermal::new(one, first_s)).collect();
     let adequate = found.adequacy.is_adequate;
     map.posterior = Some(PosteriorMap {
         grid: found.grid.map(|grid| PosteriorGrid {

@@ -18,6 +18,7 @@ use super::statistics::result::FieldStatistics;
 pub use super::stats::SampleStats;
 use super::table::PaperTable;
 pub use super::table::TableRow;
+pub use super::thermal::Thermal;
 use super::warning::Warning;
 use super::wind::Leaning;
 pub use super::window::{Rejection, WindowStats};
@@ -290,6 +291,9 @@ pub struct UpdraftMap {
     /// drones without places or errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub posterior: Option<PosteriorMap>,
+    /// Thermals: columns of rising air that no stationary field explains, the most certain first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub thermals: Vec<Thermal>,
 }
 
 /// What all values of a flight say together: a uniform updraft, a Gaussian field that may drift with the wind,

@@ -353,6 +353,9 @@ impl Output {
                 ),
             );
         }
+        for thermal in &map.thermals {
+            self.wrapped("", "  ", &thermal.sentence());
+        }
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
     }
 

@@ -496,6 +496,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             common: None,
             truth: None,
             posterior: None,
+            thermals: Vec::new(),
         }),
     }
 }
