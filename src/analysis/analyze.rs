@@ -199,7 +199,7 @@ pub fn analyze_flight(
         unknown_share: 0.0,
     };
     let aware = reference
-        .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
+        .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
         .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
     let map_law = options
         .map_law

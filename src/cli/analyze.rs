@@ -89,9 +89,13 @@ pub(super) struct AnalyzeOptions {
     offset: OffsetChoice,
     /// Analyse as in the paper: windows by their medians (means where the offset is subtracted),
     /// weighted by the samples' standard deviation, tilt as with --tilt paper; the map from those
-    /// laws alone
+    /// laws alone, as with --plain
     #[arg(long)]
     paper: bool,
+    /// Give the paper's own estimate, for comparison: the map drone by drone and second by second
+    /// from the laws of the tables (eqs. 6 and 7)
+    #[arg(long)]
+    plain: bool,
 }
 
 /// What the map is not corrected for.
@@ -113,7 +117,7 @@ struct Uncorrected {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum LawChoice {
     /// A line that may bend, unless the calibration's windows make the signed quadratic clearly more
-    /// probable (with --paper: the law with the lower chi2)
+    /// probable (with --plain: the law with the lower chi2)
     #[default]
     Auto,
     /// u = A' V + u0
@@ -189,7 +193,7 @@ impl AnalyzeOptions {
             OffsetChoice::Never => OffsetRule::Never,
         };
         options.paper_windows = self.paper;
-        options.air_aware = !self.paper;
+        options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
         Settings { options, without }
