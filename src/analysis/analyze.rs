@@ -15,8 +15,9 @@ use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
+use super::hold::Holding;
 use super::ladder::{FleetLadders, is_ladder, rungs};
-use super::law::{LawKind, LawOf};
+use super::law::{LawKind, LawOf, Symbol};
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
@@ -206,7 +207,7 @@ pub fn analyze_flight(
         .or_else(|| aware.as_ref().map(Aware::law))
         .or_else(|| map_reference.map(better_law));
     let shared =
-        Shared { input, options, reference, map_reference, planned_purpose, map_law, aware };
+        Shared { input, options, reference, map_reference, planned_purpose, map_law, corrections, aware };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
@@ -375,6 +376,8 @@ fn fleet_laws(
             None
         }
     };
+    let flock = hold(shared, drones, flock);
+    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let paper = paper_table(shared, drones);
     let laws: Vec<&Laws> = whole().filter_map(|drone| drone.laws.as_ref()).collect();
     let mut table = table::table(&laws, paper, &options.fit);
@@ -385,6 +388,31 @@ fn fleet_laws(
     warnings.extend(fit_cautions(flock.as_ref(), drones, input.leaning, input.true_updraft_mps));
     warnings.extend(tilt_caution(drones, options));
     FleetLaws { flock, table, paper }
+}
+
+/// Writes the updraft with the curve of the calibration held, if there is one, into the laws of drones and flock.
+fn hold(shared: &Shared<'_>, drones: &mut [DroneAnalysis], flock: Option<Laws>) -> Option<Laws> {
+    let Some(holding) = (!shared.options.plain).then(|| holding(shared)).flatten() else {
+        return flock;
+    };
+    drones.par_iter_mut().for_each(|drone| {
+        if let Some(laws) = &mut drone.laws {
+            laws.held = holding.of_drone(&drone.windows, drone.slot, &drone.name);
+        }
+    });
+    flock.map(|laws| Laws { held: holding.of_fleet(drones), ..laws })
+}
+
+/// The calibration whose own curve is held.
+fn holding<'a>(shared: &Shared<'a>) -> Option<Holding<'a>> {
+    let reference = shared.reference?;
+    let Shared { input, map_reference, corrections, .. } = shared;
+    let preferred = Aware::new(reference, *corrections, input.sag, None)?;
+    // Only the signed quadratic tells the air that it was calibrated in.
+    let square = map_reference.and_then(|found| found.flock.as_ref()?.signed_quadratic.as_ref());
+    let square = square.filter(|_| preferred.law() == LawKind::SignedQuadratic);
+    let origin = square.and_then(|fit| fit.parameter(Symbol::W)).map(|w| w.estimate);
+    Holding::new(reference, *corrections, input.sag, origin)
 }
 
 /// Marks the drones of a calibration with clearly less of the ladder than the fleet, and warns of them.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::fit_warning::FitWarning;
+use super::hold::HeldCurve;
 use super::kind::{LawKind, Symbol};
 use crate::base::estimate::Estimate;
 
@@ -22,6 +23,9 @@ pub struct Laws {
     /// `None` when the weights do not ask for it or there are no degrees of freedom.
     #[serde(default)]
     pub sigma_added_us: Option<f64>,
+    /// The updraft with the calibration's own curve held, where a calibration was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldCurve>,
 }
 
 /// A fitted law.

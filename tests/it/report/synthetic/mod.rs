@@ -128,6 +128,7 @@ pub(crate) fn calibration(
         ])),
         signed_quadratic_held: None,
         sigma_added_us: Some(0.42),
+        held: None,
         linear: Some(straight(23.1, U0 - 0.4)),
     };
     let table = table(&analysed);
@@ -265,6 +266,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
             sigma_added_us: Some(0.0),
+            held: None,
             linear: Some(straight(slope, u0)),
         }),
         partial_ladder: None,
