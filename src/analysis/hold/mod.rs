@@ -22,11 +22,12 @@ use self::points::{Point, average, common, keyed};
 use self::shift::{Flights, Shift, shift};
 use super::battery::{self, Pack, Sag};
 use super::budget::BatteryCorrection;
-use super::corrections::{Corrections, DOUBTS};
+use super::corrections::{Corrections, DOUBTS, WIND};
 use super::reference::same_drone;
 use super::result::{DroneAnalysis, FlightAnalysis, Laws, WindowStats};
 use super::stats::mean_sd;
 use crate::base::estimate::Estimate;
+use crate::numeric::mean;
 
 /// Legs that must lie in the calibration's range of air speeds, for a shift to be given. Chosen: three speeds
 /// are what makes a ladder.
@@ -49,7 +50,7 @@ pub struct HeldCurve {
     pub beyond: usize,
     /// Lowest and highest vertical speed of the calibration, m/s.
     pub speeds_mps: [f64; 2],
-    /// Chi² of the ladder's windows over their number less one, with all errors counted.
+    /// Chi² of the ladder's windows over their number less one, with all errors, in air as the calibration's.
     pub chi2_reduced: Option<f64>,
     /// Why there is no number, or what is doubtful about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -169,11 +170,24 @@ impl<'a> Holding<'a> {
             .map(|point| Point { velocity_mps: point.velocity_mps - origin.value, ..*point })
             .collect();
         let flights = Flights { there: &there, here, sigmas: &self.sigmas, spread };
-        Some(self.words(here, shift(&flights)?))
+        let wind_mps = self.wind_mps(&there, here);
+        Some(self.words(here, shift(&flights)?, wind_mps))
+    }
+
+    /// Standard error of the shift by wind: that the corrections are off by their doubt, or, where there are none,
+    /// what another lean may do at most, as two standard errors.
+    fn wind_mps(&self, there: &[Point], here: &[Point]) -> f64 {
+        let change = |value: fn(&Point) -> f64| {
+            let over = |points: &[Point]| mean(points.iter().map(value)).unwrap_or_default();
+            over(here) - over(there)
+        };
+        let pulse_us = self.sigmas[WIND] * change(|point| point.doubts_us[WIND]);
+        let along_mps = 0.5 * change(|point| point.axial_mps);
+        (pulse_us / self.slope).hypot(along_mps)
     }
 
     /// The result in its words.
-    fn words(&self, here: &[Point], found: Shift) -> HeldCurve {
+    fn words(&self, here: &[Point], found: Shift, wind_mps: f64) -> HeldCurve {
         let origin = self.origin.unwrap_or_default();
         let legs = || here.iter().filter(|point| point.is_leg);
         let [low, high] = found.speeds_mps;
@@ -182,7 +196,6 @@ impl<'a> Holding<'a> {
         };
         let beyond = beyond_at(found.mean_mps);
         let few = legs().count().saturating_sub(beyond) < FEWEST_INSIDE;
-        let misfit = found.chi2_reduced.is_some_and(|chi2| chi2 > MISFIT_CHI2);
         let doubt = if found.is_open {
             Some(format!(
                 "W is not determined: the windows allow air beyond {:.0} m/s",
@@ -193,10 +206,13 @@ impl<'a> Holding<'a> {
                 "W is not determined: with it, fewer than {FEWEST_INSIDE} legs flew through the air at \
                  speeds of the calibration, {low:+.1} to {high:+.1} m/s"
             ))
-        } else if misfit {
+        } else if wind_mps > WINDY_MPS && wind_mps > found.sd_mps {
+            Some(format!(
+                "the drones leaned otherwise than in the calibration: what wind along their rotor axes may                  have done is most of the error, {wind_mps:.2} m/s"
+            ))
+        } else if found.chi2_reduced.is_some_and(|chi2| chi2 > MISFIT_CHI2) {
             Some(
-                "the ladder does not have the shape of the calibration's curve, wherever it is shifted; \
-                 the error is widened by that"
+                "the ladder's windows scatter about the calibration's curve by more than its own do: its                  air moved more, or it has another shape"
                     .to_owned(),
             )
         } else {
@@ -209,12 +225,12 @@ impl<'a> Holding<'a> {
             })
         };
         let known = !(found.is_open || few);
-        let widen = if misfit { found.chi2_reduced.unwrap_or(1.0).sqrt() } else { 1.0 };
-        let se = (widen * found.sd_mps).hypot(origin.se);
+        let se_more = wind_mps.hypot(origin.se);
         let end = |end: f64| {
             let off = end - found.mean_mps;
-            found.mean_mps + off.signum() * (widen * off).hypot(NORMAL * origin.se)
+            found.mean_mps + off.signum() * off.hypot(NORMAL * se_more)
         };
+        let se = found.sd_mps.hypot(se_more);
         HeldCurve {
             updraft: known.then(|| Estimate::new(found.mean_mps, se)),
             interval_mps: known.then(|| found.interval_mps.map(end)),
@@ -230,6 +246,8 @@ impl<'a> Holding<'a> {
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
+/// An error by wind below this is not worth a sentence, m/s. Chosen, as for maps.
+const WINDY_MPS: f64 = 0.05;
 /// A reduced chi² above this is no chance with the 14 to 30 windows of a ladder: one in a thousand has 2.3 at
 /// 20 degrees of freedom.
 const MISFIT_CHI2: f64 = 2.3;

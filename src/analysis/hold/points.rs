@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::super::battery::Pack;
 use super::super::corrections::{Corrections, DOUBTS, Raw};
 use super::super::split::LEAST_NOISE_US;
+use super::super::wind::axial_of;
 use super::super::window::WindowStats;
 
 /// What was flown: kind of the window and command, and which of several alike.
@@ -23,6 +24,8 @@ pub(super) struct Point {
     pub(super) noise_us: f64,
     /// Standard error of the velocity, m/s.
     pub(super) velocity_noise_mps: f64,
+    /// What wind may add along the rotor axis where the vehicle's drag is not known, at most, m/s.
+    pub(super) axial_mps: f64,
     /// Change of the pulse per unit of each doubt, us.
     pub(super) doubts_us: [f64; DOUBTS],
 }
@@ -54,6 +57,7 @@ pub(super) fn keyed(
             pulse_us: referred.pulse_us,
             noise_us: window.effort_phi.se.max(LEAST_NOISE_US),
             velocity_noise_mps: window.velocity_mps.se,
+            axial_mps: if corrections.knows_wind() { 0.0 } else { axial_of(None, window.lean_deg) },
             doubts_us: referred.doubts_us,
         };
         let finite = [point.velocity_mps, point.pulse_us, point.noise_us, point.velocity_noise_mps];
@@ -104,6 +108,7 @@ fn of_cell(cell: &[&Point]) -> Option<Point> {
         pulse_us: over(&|one| one.pulse_us),
         noise_us: error(&|one| one.noise_us),
         velocity_noise_mps: error(&|one| one.velocity_noise_mps),
+        axial_mps: over(&|one| one.axial_mps),
         doubts_us: std::array::from_fn(|doubt| over(&|one| one.doubts_us[doubt])),
         ..**cell.first()?
     })

@@ -1,15 +1,15 @@
 //! How far a ladder is shifted along the vertical speed against another: the posterior of `W`.
 //!
 //! Both flights' windows are one Gaussian vector for each `W` and each choice of the scales (smooth rest of the
-//! curve, slow air, white scatter). The scales are weighed by the calibration's windows, the choices that count
-//! also by the ladder's. `W` has a flat prior.
+//! curve, and of each flight its slow air and white scatter). The scales are weighed by the windows. `W` has a
+//! flat prior.
 
 use std::cmp::Ordering;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::super::air_prior::Air;
-use super::super::corrections::{DOUBTS, DRIFT};
+use super::super::corrections::{DOUBTS, DRIFT, WIND};
 use super::curve::{LENGTHS_MPS, RESTS_US, Rest, basis, bent};
 use super::points::Point;
 use crate::numeric::{extent, mean};
@@ -25,9 +25,9 @@ const TAUS_S: [f64; 3] = [20.0, 90.0, 400.0];
 /// White scatter that is tried, us. A grid.
 const WHITES_US: [f64; 4] = [0.05, 0.25, 1.0, 4.0];
 /// Choices with less than this share of the heaviest one's weight are dropped. Numerical.
-const NEGLIGIBLE: f64 = 1e-2;
-/// And more than so many, the lighter ones. Numerical.
-const MOST_CHOICES: usize = 40;
+const NEGLIGIBLE: f64 = 0.02;
+/// And more than so many of the calibration, or of the ladder's air, the lighter ones. Numerical.
+const MOST_CHOICES: usize = 12;
 /// Values of `W` whose logarithm of the density is lower than the highest by more are left. Numerical.
 const DEEP: f64 = 20.0;
 /// Neighbouring values of `W` differ by no more in the logarithm of their density. Numerical.
@@ -58,7 +58,7 @@ pub(super) struct Shift {
     pub(super) is_open: bool,
     /// Lowest and highest air speed of the calibration, m/s.
     pub(super) speeds_mps: [f64; 2],
-    /// Of the ladder at the mean, with all errors.
+    /// Of the ladder at the mean, with all errors, if its air is the calibration's.
     pub(super) chi2_reduced: Option<f64>,
 }
 
@@ -67,19 +67,19 @@ pub(super) fn shift(flights: &Flights<'_>) -> Option<Shift> {
     let model = Model::new(flights)?;
     let choices = model.choices();
     let heaviest = choices.first()?;
-    let first = |w_mps: f64| Some((w_mps, model.density(heaviest, w_mps)?));
+    let every = airs();
+    let first = |w_mps: f64| Some((w_mps, model.density(heaviest, &every, w_mps)?));
     let steps = (FASTEST_MPS / STEP_MPS) as i32;
     let coarse: Vec<(f64, f64)> =
         (-steps..=steps).filter_map(|step| first(f64::from(step) * STEP_MPS)).collect();
     let best = highest(&coarse)?;
-    let over_all = |w_mps: f64| -> Option<f64> {
-        let logs: Vec<f64> = choices
-            .iter()
-            .filter_map(|choice| Some(choice.weight.ln() + model.density(choice, w_mps)?))
-            .collect();
-        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        (most.is_finite())
-            .then(|| most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln())
+    let peak = top(&coarse, first)?;
+    let airs = model.airs_at(heaviest, every, peak);
+    let over_all = |w_mps: f64| {
+        let logs = choices.iter().filter_map(|choice| {
+            Some(choice.weight.ln() + model.density(choice, &airs, w_mps)?)
+        });
+        log_sum(logs.collect())
     };
     let mut nodes: Vec<(f64, f64)> = coarse
         .iter()
@@ -124,6 +124,26 @@ pub(super) fn shift(flights: &Flights<'_>) -> Option<Shift> {
         speeds_mps: model.speeds_mps,
         chi2_reduced: chi2.filter(|_| n > 0.0).map(|chi2| chi2 / n),
     })
+}
+
+/// Where the first search's peak is.
+fn top(coarse: &[(f64, f64)], density: impl Fn(f64) -> Option<(f64, f64)>) -> Option<f64> {
+    let higher = |one: (f64, f64), other: (f64, f64)| if other.1 > one.1 { other } else { one };
+    let mut best = coarse.iter().copied().reduce(higher)?;
+    let mut step_mps = STEP_MPS / 2.0;
+    for _ in 0..ROUNDS {
+        let sides = [best.0 - step_mps, best.0 + step_mps];
+        best = sides.into_iter().filter_map(&density).fold(best, higher);
+        step_mps /= 2.0;
+    }
+    Some(best.0)
+}
+
+/// Logarithm of the sum of what has these logarithms.
+fn log_sum(logs: Vec<f64>) -> Option<f64> {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum = logs.iter().map(|log| (log - most).exp()).sum::<f64>();
+    most.is_finite().then(|| most + sum.ln())
 }
 
 fn by_place(left: &(f64, f64), right: &(f64, f64)) -> Ordering {
@@ -185,7 +205,21 @@ impl Posterior {
     }
 }
 
-/// A choice of the scales, and the calibration's windows with it.
+/// All choices of a flight's air, with the logarithms of their weights.
+fn airs() -> Vec<(Air, f64)> {
+    let mut airs = Vec::new();
+    for sd_mps in AIRS_MPS {
+        for tau_s in TAUS_S {
+            for white_us in WHITES_US {
+                let air = Air { sd_mps, tau_s, white_us };
+                airs.push((air, air.prior().ln()));
+            }
+        }
+    }
+    airs
+}
+
+/// A choice of the scales of calibration and curve, and the calibration's windows with it.
 struct Choice {
     rest: Rest,
     air: Air,
@@ -246,14 +280,14 @@ impl<'a> Model<'a> {
         })
     }
 
-    /// What corrections leave open in both flights alike.
+    /// What corrections leave open in both flights alike, us². Not the wind's: flow along a leaning rotor axis is
+    /// the very shift that is looked for, and no likelihood tells them apart.
     fn doubts(&self, left: &Point, right: &Point) -> f64 {
-        (0..DOUBTS)
-            .filter(|doubt| *doubt != DRIFT)
-            .map(|doubt| {
-                self.flights.sigmas[doubt].powi(2) * left.doubts_us[doubt] * right.doubts_us[doubt]
-            })
-            .sum()
+        let of = |doubt: usize| {
+            let sigma = self.flights.sigmas[doubt];
+            sigma * sigma * left.doubts_us[doubt] * right.doubts_us[doubt]
+        };
+        (0..DOUBTS).filter(|doubt| ![DRIFT, WIND].contains(doubt)).map(of).sum()
     }
 
     /// The choices of the scales that count, heaviest first.
@@ -276,18 +310,13 @@ impl<'a> Model<'a> {
                 (rest, covariance + &smooth)
             })
             .collect();
-        for sd_mps in AIRS_MPS {
-            for tau_s in TAUS_S {
-                for white_us in WHITES_US {
-                    let air = Air { sd_mps, tau_s, white_us };
-                    let own = self.own(there, &slopes, &air);
-                    for (rest, covariance) in &rests {
-                        let Some(factor) = (covariance + &own).cholesky() else { continue };
-                        let solved = factor.solve(&self.pulses[0]);
-                        let log = log_density(&factor, &self.pulses[0], &solved) + air.prior().ln();
-                        choices.push(Choice { rest: *rest, air, weight: log, factor, solved });
-                    }
-                }
+        for (air, prior) in airs() {
+            let own = self.own(there, &slopes, &air);
+            for (rest, covariance) in &rests {
+                let Some(factor) = (covariance + &own).cholesky() else { continue };
+                let solved = factor.solve(&self.pulses[0]);
+                let weight = log_density(&factor, &self.pulses[0], &solved) + prior;
+                choices.push(Choice { rest: *rest, air, weight, factor, solved });
             }
         }
         choices.sort_by(|left, right| right.weight.total_cmp(&left.weight));
@@ -300,8 +329,22 @@ impl<'a> Model<'a> {
         choices
     }
 
-    /// The ladder's windows less what the calibration says of them at `W`, and their covariance.
-    fn rest(&self, choice: &Choice, w_mps: f64) -> (DVector<f64>, DMatrix<f64>) {
+    /// The choices of the ladder's air that count at `W`.
+    fn airs_at(&self, choice: &Choice, airs: Vec<(Air, f64)>, w_mps: f64) -> Vec<(Air, f64)> {
+        let mut weighed: Vec<(f64, (Air, f64))> = airs
+            .into_iter()
+            .filter_map(|one| Some((self.density(choice, &[one], w_mps)?, one)))
+            .collect();
+        weighed.sort_by(|left, right| right.0.total_cmp(&left.0));
+        let most = weighed.first().map_or(0.0, |one| one.0);
+        weighed.retain(|one| one.0 > most + NEGLIGIBLE.ln());
+        weighed.truncate(MOST_CHOICES);
+        weighed.into_iter().map(|(_, one)| one).collect()
+    }
+
+    /// The ladder's windows less what the calibration says of them at `W`, and the covariance of that but for the
+    /// ladder's own; the slopes there.
+    fn rest(&self, choice: &Choice, w_mps: f64) -> (DVector<f64>, DMatrix<f64>, Vec<f64>) {
         let Flights { there, here, spread, .. } = self.flights;
         let airs: Vec<f64> = here.iter().map(|point| point.velocity_mps - w_mps).collect();
         let bases: Vec<[f64; 4]> = airs.iter().map(|air| basis(*air)).collect();
@@ -311,7 +354,7 @@ impl<'a> Model<'a> {
                 + choice.rest.covariance(there[row].velocity_mps, airs[column])
                 + self.doubts(&there[row], &here[column])
         });
-        let mut covariance = self.own(here, &slopes, &choice.air);
+        let mut covariance = DMatrix::zeros(here.len(), here.len());
         for row in 0..here.len() {
             for column in 0..=row {
                 let value = bent(&bases[row], &bases[column])
@@ -319,10 +362,8 @@ impl<'a> Model<'a> {
                     + self.doubts(&here[row], &here[column])
                     + spread[0].powi(2)
                     + spread[1].powi(2) * airs[row] * airs[column];
-                covariance[(row, column)] += value;
-                if row != column {
-                    covariance[(column, row)] += value;
-                }
+                covariance[(row, column)] = value;
+                covariance[(column, row)] = value;
             }
         }
         let residual = &self.pulses[1] - across.tr_mul(&choice.solved);
@@ -330,20 +371,25 @@ impl<'a> Model<'a> {
         if let Some(known) = known {
             covariance -= known.tr_mul(&known);
         }
-        (residual, covariance)
+        (residual, covariance, slopes)
     }
 
-    /// Logarithm of the density of the ladder's windows at `W`.
-    fn density(&self, choice: &Choice, w_mps: f64) -> Option<f64> {
-        let (residual, covariance) = self.rest(choice, w_mps);
-        let factor = covariance.cholesky()?;
-        let log = log_density(&factor, &residual, &factor.solve(&residual));
-        log.is_finite().then_some(log)
+    /// Logarithm of the density of the ladder's windows at `W`, over choices of their air.
+    fn density(&self, choice: &Choice, airs: &[(Air, f64)], w_mps: f64) -> Option<f64> {
+        let (residual, covariance, slopes) = self.rest(choice, w_mps);
+        let one = |(air, prior): &(Air, f64)| {
+            let factor = (&covariance + self.own(self.flights.here, &slopes, air)).cholesky()?;
+            let log = log_density(&factor, &residual, &factor.solve(&residual)) + prior;
+            log.is_finite().then_some(log)
+        };
+        log_sum(airs.iter().filter_map(one).collect())
     }
 
+    /// Chi² of the ladder at `W`, in the calibration's air.
     fn chi2(&self, choice: &Choice, w_mps: f64) -> Option<f64> {
-        let (residual, covariance) = self.rest(choice, w_mps);
-        Some(residual.dot(&covariance.cholesky()?.solve(&residual)))
+        let (residual, covariance, slopes) = self.rest(choice, w_mps);
+        let all = covariance + self.own(self.flights.here, &slopes, &choice.air);
+        Some(residual.dot(&all.cholesky()?.solve(&residual)))
     }
 }
 
