@@ -15,6 +15,7 @@ use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
+use super::headline;
 use super::hold::Holding;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf, Symbol};
@@ -237,7 +238,11 @@ pub fn analyze_flight(
         account.ones.sort_by_key(|one| one.drone.slot);
     }
     let contradictions = warnings.into_iter().map(Warning::WhoseLogs).collect();
-    Ok(finish(&shared, account, contradictions))
+    let mut flight = finish(&shared, account, contradictions);
+    if flight.purpose == Purpose::Calibration && !options.plain {
+        headline::add(&mut flight, corrections, input.sag);
+    }
+    Ok(flight)
 }
 
 /// Unusable logs named in an error.
@@ -289,6 +294,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         missing: account::missing(input, &drones, &unused),
         drones,
         flock: laws.flock,
+        headline: None,
         table: laws.table,
         map,
         statistics,
@@ -380,7 +386,7 @@ fn fleet_laws(
     let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let paper = paper_table(shared, drones);
     let laws: Vec<&Laws> = whole().filter_map(|drone| drone.laws.as_ref()).collect();
-    let mut table = table::table(&laws, paper, &options.fit);
+    let mut table = table::table(&laws, paper, &options.fit, options.plain);
     if let Some(laws) = &flock {
         let vertex = vertex_mps(laws, drones, input.true_updraft_mps).is_some();
         compare_what_fits(&mut table, laws, vertex);

@@ -114,6 +114,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         windows: stats,
         offset,
         laws: None,
+        line: None,
         partial_ladder: None,
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,

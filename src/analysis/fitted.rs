@@ -53,6 +53,10 @@ pub struct Fit {
     pub other_minima: Vec<Vec<f64>>,
     /// What is doubtful about this fit.
     pub warnings: Vec<FitWarning>,
+    /// The edge of the searched range of W where the fit ended, m/s: W lies beyond, and no other parameter of the
+    /// fit means anything. Absent: it ended within.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub w_beyond_mps: Option<f64>,
 }
 
 impl Fit {

@@ -153,6 +153,7 @@ pub(crate) fn calibration(
             })
             .collect(),
         flock: (drones > 1).then_some(flock),
+        headline: None,
         table: if drones > 1 { table } else { Vec::new() },
         map: None,
         unmeasured: Vec::new(),
@@ -262,6 +263,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         },
         windows,
         offset: None,
+        line: None,
         laws: Some(Laws {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
@@ -441,6 +443,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             windows: Vec::new(),
             offset: None,
             laws: None,
+            line: None,
             partial_ladder: None,
             trace: Trace::default(),
             warnings: if slot == 20 {
@@ -471,6 +474,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             })
             .collect(),
         flock: None,
+        headline: None,
         table: Vec::new(),
         unmeasured: vec![Unmeasured {
             slot: Some(44),
