@@ -48,7 +48,8 @@ pub(super) struct AnalyzeArgs {
     /// Plan that the logs were flown from: plan.json, a flight's folder, .skyc or .skyb
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Take A and u0 from this analysis.json and fit only W
+    /// Hold the law of each drone in this analysis.json, as the curve that it flew, and fit only the
+    /// updraft W, with its error; beside it the paper's way, with A and u0 held
     #[arg(long, value_name = "FILE")]
     hold: Option<PathBuf>,
     /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
@@ -92,8 +93,8 @@ pub(super) struct AnalyzeOptions {
     /// laws alone, as with --plain
     #[arg(long)]
     paper: bool,
-    /// Give the paper's own estimate, for comparison: the map drone by drone and second by second
-    /// from the laws of the tables (eqs. 6 and 7)
+    /// Give the paper's own estimate, for comparison: its two laws alone, and the map drone by drone
+    /// and second by second from them (eqs. 6 and 7)
     #[arg(long)]
     plain: bool,
 }
@@ -171,6 +172,11 @@ enum OffsetChoice {
 }
 
 impl AnalyzeOptions {
+    /// Those of `updraft run`.
+    pub(super) fn of_run(plain: bool) -> Self {
+        Self { plain, ..Self::default() }
+    }
+
     fn settings(&self) -> Settings {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {

@@ -14,6 +14,8 @@
 mod curve;
 mod points;
 mod shift;
+#[cfg(test)]
+mod tests;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

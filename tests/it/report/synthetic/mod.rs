@@ -317,6 +317,7 @@ pub(crate) fn fit(parameters: &[(Symbol, f64, f64)]) -> Fit {
         rms_us: 0.61,
         other_minima: Vec::new(),
         warnings: Vec::new(),
+        w_beyond_mps: None,
     }
 }
 
