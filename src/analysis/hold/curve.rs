@@ -13,6 +13,10 @@ pub(super) const RESTS_US: [f64; 4] = [0.03, 0.2, 1.2, 7.0];
 /// Air speeds over which the rest changes that are tried, m/s: from three rungs to the whole ladder. A grid.
 pub(super) const LENGTHS_MPS: [f64; 2] = [1.5, 4.0];
 
+/// How far off the continued curve may be beyond the calibration's speeds: a vortex ring takes 10 to 50 us where it
+/// begins (docs/physics.md, 2.4), and nothing slower tells of it. us/(m/s), and us/(m/s)². Chosen around that.
+const BEYOND: [f64; 2] = [2.0, 10.0];
+
 /// A choice of the smooth rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rest {
@@ -30,6 +34,14 @@ pub(super) fn basis(air_mps: f64) -> [f64; 4] {
 /// Covariance of the pulse at two air speeds by the line with bends, us².
 pub(super) fn bent(left: &[f64; 4], right: &[f64; 4]) -> f64 {
     PRIOR.iter().zip(left).zip(right).map(|((sd, left), right)| sd * sd * left * right).sum()
+}
+
+/// Standard error of the continued curve at an air speed, us: below the calibration's speeds, and above.
+pub(super) fn beyond_us(air_mps: f64, [low, high]: [f64; 2]) -> [f64; 2] {
+    [low - air_mps, air_mps - high].map(|by| {
+        let by = by.max(0.0);
+        BEYOND[0] * by + BEYOND[1] * by * by
+    })
 }
 
 impl Rest {

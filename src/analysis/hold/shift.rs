@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::super::air_prior::Air;
 use super::super::corrections::{DOUBTS, DRIFT, WIND};
-use super::curve::{LENGTHS_MPS, RESTS_US, Rest, basis, bent};
+use super::curve::{LENGTHS_MPS, RESTS_US, Rest, basis, bent, beyond_us};
 use super::points::Point;
 use crate::numeric::{extent, mean};
 
@@ -354,6 +354,8 @@ impl<'a> Model<'a> {
                 + choice.rest.covariance(there[row].velocity_mps, airs[column])
                 + self.doubts(&there[row], &here[column])
         });
+        let beyond: Vec<[f64; 2]> =
+            airs.iter().map(|air| beyond_us(*air, self.speeds_mps)).collect();
         let mut covariance = DMatrix::zeros(here.len(), here.len());
         for row in 0..here.len() {
             for column in 0..=row {
@@ -361,7 +363,9 @@ impl<'a> Model<'a> {
                     + choice.rest.covariance(airs[row], airs[column])
                     + self.doubts(&here[row], &here[column])
                     + spread[0].powi(2)
-                    + spread[1].powi(2) * airs[row] * airs[column];
+                    + spread[1].powi(2) * airs[row] * airs[column]
+                    + beyond[row][0] * beyond[column][0]
+                    + beyond[row][1] * beyond[column][1];
                 covariance[(row, column)] = value;
                 covariance[(column, row)] = value;
             }
