@@ -13,10 +13,10 @@ use super::caution::{fit_cautions, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
-use super::input::{FlightInput, LogInput, TruthSeries};
-use super::kriging::Drone;
 use super::headline;
 use super::hold::Holding;
+use super::input::{FlightInput, LogInput, TruthSeries};
+use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf, Symbol};
 use super::map_statistics::{HoverSeen, of_map};
@@ -207,8 +207,16 @@ pub fn analyze_flight(
         .map_law
         .or_else(|| aware.as_ref().map(Aware::law))
         .or_else(|| map_reference.map(better_law));
-    let shared =
-        Shared { input, options, reference, map_reference, planned_purpose, map_law, corrections, aware };
+    let shared = Shared {
+        input,
+        options,
+        reference,
+        map_reference,
+        planned_purpose,
+        map_law,
+        corrections,
+        aware,
+    };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();

@@ -85,9 +85,10 @@ pub(super) fn add(flight: &mut FlightAnalysis, corrections: Corrections<'_>, sag
     if is_line {
         for (drone, law) in flight.drones.iter_mut().zip(&zero.drones) {
             drone.line = law.as_ref().map(|law| {
-                let own = DMatrix::from_fn(zero.common.nrows(), zero.common.ncols(), |row, column| {
-                    zero.common[(row, column)] + law.own[(row, column)]
-                });
+                let own =
+                    DMatrix::from_fn(zero.common.nrows(), zero.common.ncols(), |row, column| {
+                        zero.common[(row, column)] + law.own[(row, column)]
+                    });
                 BentLine::of(law, &own, zero.speeds_mps)
             });
         }

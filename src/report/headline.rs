@@ -67,7 +67,8 @@ pub(super) fn held_words(flight: &FlightAnalysis) -> Option<String> {
         ));
     };
     let doubt = doubt.map_or_else(String::new, |doubt| format!("; {doubt}"));
-    let of = if held.calibration_w_mps.is_some() { "" } else { " relative to the calibration's air" };
+    let of =
+        if held.calibration_w_mps.is_some() { "" } else { " relative to the calibration's air" };
     Some(format!(
         "against the calibration's own curve: W = {} m/s{of} (95 %: {} to {} m/s){doubt}",
         estimate(w),

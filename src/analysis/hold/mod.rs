@@ -119,15 +119,13 @@ impl<'a> Holding<'a> {
 
     /// The updraft of the average over a fleet's drones.
     pub(super) fn of_fleet(&self, drones: &[DroneAnalysis]) -> Option<HeldCurve> {
-        let counts = |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
+        let counts =
+            |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
         let own = |drone: &DroneAnalysis| {
             same_drone(self.reference, drone.slot, &drone.name).filter(counts)
         };
-        let pairs: Vec<(&DroneAnalysis, &DroneAnalysis)> = drones
-            .iter()
-            .filter(counts)
-            .filter_map(|drone| Some((own(drone)?, drone)))
-            .collect();
+        let pairs: Vec<(&DroneAnalysis, &DroneAnalysis)> =
+            drones.iter().filter(counts).filter_map(|drone| Some((own(drone)?, drone))).collect();
         if pairs.is_empty() {
             let here: Vec<Vec<Point>> = (drones.iter().filter(counts))
                 .map(|drone| self.points(&drone.windows, None))
@@ -150,7 +148,8 @@ impl<'a> Holding<'a> {
 
     /// The calibration's windows averaged over its drones.
     fn average(&self) -> Vec<Point> {
-        let counts = |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
+        let counts =
+            |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
         let all: Vec<Vec<Point>> = (self.reference.drones.iter().filter(counts))
             .map(|drone| self.points(&drone.windows, Some(drone)))
             .collect();
@@ -194,10 +193,12 @@ impl<'a> Holding<'a> {
         let legs = || here.iter().filter(|point| point.is_leg);
         let [low, high] = found.speeds_mps;
         let beyond_at = |w_mps: f64| {
+            let [low, high] = [low - SAME_MPS, high + SAME_MPS];
             legs().filter(|point| !(low..=high).contains(&(point.velocity_mps - w_mps))).count()
         };
         let beyond = beyond_at(found.mean_mps);
         let few = legs().count().saturating_sub(beyond) < FEWEST_INSIDE;
+        let stormy = wind_mps > MOST_WIND_MPS;
         let doubt = if found.is_open {
             Some(format!(
                 "W is not determined: the windows allow air beyond {:.0} m/s",
@@ -208,6 +209,12 @@ impl<'a> Holding<'a> {
                 "W is not determined: with it, fewer than {FEWEST_INSIDE} legs flew through the air at \
                  speeds of the calibration, {low:+.1} to {high:+.1} m/s"
             ))
+        } else if stormy {
+            Some(
+                "W is not determined: the drones leaned otherwise than in the calibration, and what wind along \
+                 their rotor axes may have done is more than that (the vehicle's drag is not known)"
+                    .to_owned(),
+            )
         } else if wind_mps > WINDY_MPS && wind_mps > found.sd_mps {
             Some(format!(
                 "the drones leaned otherwise than in the calibration: what wind along their rotor axes may                  have done is most of the error, {wind_mps:.2} m/s"
@@ -226,7 +233,7 @@ impl<'a> Holding<'a> {
                 )
             })
         };
-        let known = !(found.is_open || few);
+        let known = !(found.is_open || few || stormy);
         let se_more = wind_mps.hypot(origin.se);
         let end = |end: f64| {
             let off = end - found.mean_mps;
@@ -250,6 +257,10 @@ impl<'a> Holding<'a> {
 const NORMAL: f64 = 1.96;
 /// An error by wind below this is not worth a sentence, m/s. Chosen, as for maps.
 const WINDY_MPS: f64 = 0.05;
+/// With a larger error by wind, a shift of the air's usual size is not determined, m/s. Chosen.
+const MOST_WIND_MPS: f64 = 1.0;
+/// Speeds that differ by less are the same rung, m/s: how well drones follow. Chosen.
+const SAME_MPS: f64 = 0.05;
 /// A reduced chi² above this is no chance with the 14 to 30 windows of a ladder: one in a thousand has 2.3 at
 /// 20 degrees of freedom.
 const MISFIT_CHI2: f64 = 2.3;

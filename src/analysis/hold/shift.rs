@@ -76,9 +76,9 @@ pub(super) fn shift(flights: &Flights<'_>) -> Option<Shift> {
     let peak = top(&coarse, first)?;
     let airs = model.airs_at(heaviest, every, peak);
     let over_all = |w_mps: f64| {
-        let logs = choices.iter().filter_map(|choice| {
-            Some(choice.weight.ln() + model.density(choice, &airs, w_mps)?)
-        });
+        let logs = choices
+            .iter()
+            .filter_map(|choice| Some(choice.weight.ln() + model.density(choice, &airs, w_mps)?));
         log_sum(logs.collect())
     };
     let mut nodes: Vec<(f64, f64)> = coarse
@@ -201,7 +201,11 @@ impl Posterior {
     fn at_ends(&self) -> f64 {
         let shares = self.up_to.windows(2).map(|pair| pair[1] - pair[0]);
         let far = self.nodes.windows(2).map(|pair| pair[0].0.abs().max(pair[1].0.abs()));
-        shares.zip(far).filter(|(_, far)| *far > FASTEST_MPS - STEP_MPS).map(|(share, _)| share).sum()
+        shares
+            .zip(far)
+            .filter(|(_, far)| *far > FASTEST_MPS - STEP_MPS)
+            .map(|(share, _)| share)
+            .sum()
     }
 }
 
@@ -398,11 +402,7 @@ impl<'a> Model<'a> {
 }
 
 /// Logarithm of a normal density, but for a constant.
-fn log_density(
-    factor: &Cholesky<f64, Dyn>,
-    values: &DVector<f64>,
-    solved: &DVector<f64>,
-) -> f64 {
+fn log_density(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>, solved: &DVector<f64>) -> f64 {
     let log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum();
     -log_determinant - 0.5 * values.dot(solved)
 }
