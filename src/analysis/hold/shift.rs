@@ -79,7 +79,7 @@ pub(super) fn shift(flights: &Flights<'_>) -> Option<Shift> {
         let logs = choices
             .iter()
             .filter_map(|choice| Some(choice.weight.ln() + model.density(choice, &airs, w_mps)?));
-        log_sum(logs.collect())
+        log_sum(&logs.collect::<Vec<f64>>())
     };
     let mut nodes: Vec<(f64, f64)> = coarse
         .iter()
@@ -140,7 +140,7 @@ fn top(coarse: &[(f64, f64)], density: impl Fn(f64) -> Option<(f64, f64)>) -> Op
 }
 
 /// Logarithm of the sum of what has these logarithms.
-fn log_sum(logs: Vec<f64>) -> Option<f64> {
+fn log_sum(logs: &[f64]) -> Option<f64> {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum = logs.iter().map(|log| (log - most).exp()).sum::<f64>();
     most.is_finite().then(|| most + sum.ln())
@@ -390,7 +390,7 @@ impl<'a> Model<'a> {
             let log = log_density(&factor, &residual, &factor.solve(&residual)) + prior;
             log.is_finite().then_some(log)
         };
-        log_sum(airs.iter().filter_map(one).collect())
+        log_sum(&airs.iter().filter_map(one).collect::<Vec<f64>>())
     }
 
     /// Chi² of the ladder at `W`, in the calibration's air.
