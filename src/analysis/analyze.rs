@@ -13,10 +13,12 @@ use super::caution::{fit_cautions, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
+use super::headline;
+use super::hold::Holding;
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
-use super::law::{LawKind, LawOf};
+use super::law::{LawKind, LawOf, Symbol};
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
@@ -199,14 +201,22 @@ pub fn analyze_flight(
         unknown_share: 0.0,
     };
     let aware = reference
-        .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
+        .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
         .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
     let map_law = options
         .map_law
         .or_else(|| aware.as_ref().map(Aware::law))
         .or_else(|| map_reference.map(better_law));
-    let shared =
-        Shared { input, options, reference, map_reference, planned_purpose, map_law, aware };
+    let shared = Shared {
+        input,
+        options,
+        reference,
+        map_reference,
+        planned_purpose,
+        map_law,
+        corrections,
+        aware,
+    };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
@@ -236,7 +246,11 @@ pub fn analyze_flight(
         account.ones.sort_by_key(|one| one.drone.slot);
     }
     let contradictions = warnings.into_iter().map(Warning::WhoseLogs).collect();
-    Ok(finish(&shared, account, contradictions))
+    let mut flight = finish(&shared, account, contradictions);
+    if flight.purpose == Purpose::Calibration && !options.plain {
+        headline::add(&mut flight, corrections, input.sag);
+    }
+    Ok(flight)
 }
 
 /// Unusable logs named in an error.
@@ -288,6 +302,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         missing: account::missing(input, &drones, &unused),
         drones,
         flock: laws.flock,
+        headline: None,
         table: laws.table,
         map,
         statistics,
@@ -375,9 +390,11 @@ fn fleet_laws(
             None
         }
     };
+    let flock = hold(shared, drones, flock);
+    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let paper = paper_table(shared, drones);
     let laws: Vec<&Laws> = whole().filter_map(|drone| drone.laws.as_ref()).collect();
-    let mut table = table::table(&laws, paper, &options.fit);
+    let mut table = table::table(&laws, paper, &options.fit, options.plain);
     if let Some(laws) = &flock {
         let vertex = vertex_mps(laws, drones, input.true_updraft_mps).is_some();
         compare_what_fits(&mut table, laws, vertex);
@@ -385,6 +402,31 @@ fn fleet_laws(
     warnings.extend(fit_cautions(flock.as_ref(), drones, input.leaning, input.true_updraft_mps));
     warnings.extend(tilt_caution(drones, options));
     FleetLaws { flock, table, paper }
+}
+
+/// Writes the updraft with the curve of the calibration held, if there is one, into the laws of drones and flock.
+fn hold(shared: &Shared<'_>, drones: &mut [DroneAnalysis], flock: Option<Laws>) -> Option<Laws> {
+    let Some(holding) = (!shared.options.plain).then(|| holding(shared)).flatten() else {
+        return flock;
+    };
+    drones.par_iter_mut().for_each(|drone| {
+        if let Some(laws) = &mut drone.laws {
+            laws.held = holding.of_drone(&drone.windows, drone.slot, &drone.name);
+        }
+    });
+    flock.map(|laws| Laws { held: holding.of_fleet(drones), ..laws })
+}
+
+/// The calibration whose own curve is held.
+fn holding<'a>(shared: &Shared<'a>) -> Option<Holding<'a>> {
+    let reference = shared.reference?;
+    let Shared { input, map_reference, corrections, .. } = shared;
+    let preferred = Aware::new(reference, *corrections, input.sag, None)?;
+    // Only the signed quadratic tells the air that it was calibrated in.
+    let square = map_reference.and_then(|found| found.flock.as_ref()?.signed_quadratic.as_ref());
+    let square = square.filter(|_| preferred.law() == LawKind::SignedQuadratic);
+    let origin = square.and_then(|fit| fit.parameter(Symbol::W)).map(|w| w.estimate);
+    Holding::new(reference, *corrections, input.sag, origin)
 }
 
 /// Marks the drones of a calibration with clearly less of the ladder than the fleet, and warns of them.

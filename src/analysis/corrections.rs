@@ -106,6 +106,11 @@ pub(super) struct Referred {
 }
 
 impl Corrections<'_> {
+    /// Whether the vehicle's drag is known, so that wind is corrected for.
+    pub(super) fn knows_wind(&self) -> bool {
+        self.leaning.is_some() || self.lean_table.is_some()
+    }
+
     /// Standard errors of the doubts (units of [`Referred::doubts_us`]).
     pub(super) fn sigmas(&self, pack: Option<&Pack>) -> [f64; DOUBTS] {
         let mut sigmas = [0.0; DOUBTS];
@@ -114,8 +119,7 @@ impl Corrections<'_> {
         }
         // Both kinds of drift are scaled to us in `refer`.
         sigmas[DRIFT] = if self.warm_up_us.is_some() { 1.0 } else { 0.0 };
-        let known = self.leaning.is_some() || self.lean_table.is_some();
-        sigmas[WIND] = if known { WIND_SHARE } else { UNKNOWN_WIND_SHARE };
+        sigmas[WIND] = if self.knows_wind() { WIND_SHARE } else { UNKNOWN_WIND_SHARE };
         sigmas[DENSITY] = match self.density {
             // AirSim's thrust is linear by definition; the weather of the day is not the standard's.
             Some(density) if density.exponent == 1.0 => 0.0,

@@ -3,6 +3,7 @@
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
+use super::corrections::Corrections;
 use super::hover::Hover;
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::law::{LawKind, LawOf};
@@ -32,6 +33,7 @@ pub(super) struct Shared<'a> {
     pub(super) map_reference: Option<&'a FlightAnalysis>,
     pub(super) planned_purpose: Option<Purpose>,
     pub(super) map_law: Option<LawKind>,
+    pub(super) corrections: Corrections<'a>,
     /// The calibration with what it tells about errors, for the map.
     pub(super) aware: Option<Aware<'a>>,
 }
@@ -112,6 +114,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         windows: stats,
         offset,
         laws: None,
+        line: None,
         partial_ladder: None,
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,

@@ -23,6 +23,8 @@ mod drone;
 pub mod fit;
 mod fit_warning;
 mod fitted;
+mod headline;
+mod hold;
 mod hover;
 mod input;
 mod kind;

@@ -11,6 +11,8 @@ use super::cause::Cause;
 use super::density::Density;
 pub use super::fit_warning::FitWarning;
 pub use super::fitted::{Fit, Laws, Parameter};
+pub use super::headline::{BentLine, Headline};
+pub use super::hold::HeldCurve;
 use super::kind::{LawKind, LawOf};
 pub use super::ladder::{Ladder, PartialLadder};
 use super::offset::OffsetMap;
@@ -74,6 +76,9 @@ pub struct FlightAnalysis {
     pub missing: Vec<Missing>,
     /// Fits to the windows of all drones averaged (the paper's flock mapping), for calibrations.
     pub flock: Option<Laws>,
+    /// The law that the windows prefer, for calibrations; absent: not asked for, or the windows do not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub headline: Option<Headline>,
     /// Statistics over drones of the fitted parameters (Tables I and II).
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
@@ -225,6 +230,9 @@ pub struct DroneAnalysis {
     pub offset: Option<OffsetMap>,
     /// Fitted laws, for calibrations.
     pub laws: Option<Laws>,
+    /// The line that may bend, for calibrations whose windows prefer it ([`FlightAnalysis::headline`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<BentLine>,
     /// Set if the laws rest on clearly less of the ladder than those of the fleet: then they do not
     /// count in [`FlightAnalysis::table`] and [`FlightAnalysis::flock`], and no map uses them.
     #[serde(default, skip_serializing_if = "Option::is_none")]

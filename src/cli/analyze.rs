@@ -48,7 +48,8 @@ pub(super) struct AnalyzeArgs {
     /// Plan that the logs were flown from: plan.json, a flight's folder, .skyc or .skyb
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Take A and u0 from this analysis.json and fit only W
+    /// Hold the law of each drone in this analysis.json, as the curve that it flew, and fit only the
+    /// updraft W, with its error; beside it the paper's way, with A and u0 held
     #[arg(long, value_name = "FILE")]
     hold: Option<PathBuf>,
     /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
@@ -89,9 +90,13 @@ pub(super) struct AnalyzeOptions {
     offset: OffsetChoice,
     /// Analyse as in the paper: windows by their medians (means where the offset is subtracted),
     /// weighted by the samples' standard deviation, tilt as with --tilt paper; the map from those
-    /// laws alone
+    /// laws alone, as with --plain
     #[arg(long)]
     paper: bool,
+    /// Give the paper's own estimate, for comparison: its two laws alone, and the map drone by drone
+    /// and second by second from them (eqs. 6 and 7)
+    #[arg(long)]
+    plain: bool,
 }
 
 /// What the map is not corrected for.
@@ -113,7 +118,7 @@ struct Uncorrected {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum LawChoice {
     /// A line that may bend, unless the calibration's windows make the signed quadratic clearly more
-    /// probable (with --paper: the law with the lower chi2)
+    /// probable (with --plain: the law with the lower chi2)
     #[default]
     Auto,
     /// u = A' V + u0
@@ -167,6 +172,11 @@ enum OffsetChoice {
 }
 
 impl AnalyzeOptions {
+    /// Those of `updraft run`.
+    pub(super) fn of_run(plain: bool) -> Self {
+        Self { plain, ..Self::default() }
+    }
+
     fn settings(&self) -> Settings {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {
@@ -189,7 +199,7 @@ impl AnalyzeOptions {
             OffsetChoice::Never => OffsetRule::Never,
         };
         options.paper_windows = self.paper;
-        options.air_aware = !self.paper;
+        options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
         Settings { options, without }

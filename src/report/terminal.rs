@@ -13,6 +13,7 @@ use super::compare::{
 };
 use super::figures::air::mean_truth;
 use super::fleet_air::fleet_air;
+use super::headline::{bent_cells, bent_line, held, held_cell, held_words};
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::statistics_lines::statistics_lines;
@@ -125,6 +126,9 @@ impl Output {
         if let Some(words) = better_words(flight) {
             self.wrapped("", "  ", &format!("{}.", capitalised(&words)));
         }
+        if let Some(words) = held_words(flight) {
+            self.wrapped("", "  ", &format!("{}.", capitalised(&words)));
+        }
         self.fleet_table(flight);
         self.flock(flight);
         if let Some(map) = &flight.map {
@@ -212,12 +216,19 @@ impl Output {
 
     fn drones(&mut self, flight: &FlightAnalysis) {
         let added = if flight.indicator == Indicator::Pulse { "added µs" } else { "added" };
-        let columns = [
+        // What is preferred stands first, and the paper's law gives way where there is no room.
+        let bent = bent_line(flight).is_some();
+        let held = held(flight).is_some();
+        let [law, constant, vertex] = if bent || held { [9, 10, 8] } else { [1, 2, 0] };
+        let mut columns = vec![
             column("slot", Align::Right, 0),
             column("name", Align::Left, 3),
-            column("A", Align::Right, 1),
-            column("u₀", Align::Right, 2),
-            column("W*", Align::Right, 0),
+            column("W held", Align::Right, 0),
+            column("u₀ in hover", Align::Right, 1),
+            column("A′ in hover", Align::Right, 0),
+            column("A", Align::Right, law),
+            column("u₀", Align::Right, constant),
+            column("W*", Align::Right, vertex),
             column("χ²/ν", Align::Right, 6),
             column("A′", Align::Right, 0),
             column("χ²/ν (linear)", Align::Right, 6),
@@ -235,9 +246,13 @@ impl Output {
             .take(DRONE_LIMIT)
             .map(|drone| {
                 let laws = drone_laws(drone);
+                let [bent_u0, bent_slope] = bent_cells(flight, drone);
                 vec![
                     drone.slot.map_or_else(|| NONE.to_owned(), |slot| slot.to_string()),
                     shortened(&drone.name, 16),
+                    held_cell(drone),
+                    bent_u0,
+                    bent_slope,
                     laws.a,
                     laws.u0,
                     laws.w,
@@ -251,6 +266,13 @@ impl Output {
                 ]
             })
             .collect();
+        let shown = |index: usize| match index {
+            2 => held,
+            3 | 4 => bent,
+            _ => true,
+        };
+        let rows: Vec<Vec<String>> = rows.into_iter().map(|row| kept(row, shown)).collect();
+        columns = kept(columns, shown);
         if rows.is_empty() {
             return;
         }
@@ -411,4 +433,9 @@ fn style_of(value: f64, largest: f64) -> &'static str {
     } else {
         ""
     }
+}
+
+/// What of a row is shown.
+fn kept<T>(row: Vec<T>, shown: impl Fn(usize) -> bool) -> Vec<T> {
+    row.into_iter().enumerate().filter(|(index, _)| shown(*index)).map(|(_, cell)| cell).collect()
 }

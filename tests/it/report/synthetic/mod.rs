@@ -128,6 +128,7 @@ pub(crate) fn calibration(
         ])),
         signed_quadratic_held: None,
         sigma_added_us: Some(0.42),
+        held: None,
         linear: Some(straight(23.1, U0 - 0.4)),
     };
     let table = table(&analysed);
@@ -152,6 +153,7 @@ pub(crate) fn calibration(
             })
             .collect(),
         flock: (drones > 1).then_some(flock),
+        headline: None,
         table: if drones > 1 { table } else { Vec::new() },
         map: None,
         unmeasured: Vec::new(),
@@ -261,10 +263,12 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         },
         windows,
         offset: None,
+        line: None,
         laws: Some(Laws {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
             sigma_added_us: Some(0.0),
+            held: None,
             linear: Some(straight(slope, u0)),
         }),
         partial_ladder: None,
@@ -313,6 +317,7 @@ pub(crate) fn fit(parameters: &[(Symbol, f64, f64)]) -> Fit {
         rms_us: 0.61,
         other_minima: Vec::new(),
         warnings: Vec::new(),
+        w_beyond_mps: None,
     }
 }
 
@@ -442,6 +447,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             windows: Vec::new(),
             offset: None,
             laws: None,
+            line: None,
             partial_ladder: None,
             trace: Trace::default(),
             warnings: if slot == 20 {
@@ -472,6 +478,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             })
             .collect(),
         flock: None,
+        headline: None,
         table: Vec::new(),
         unmeasured: vec![Unmeasured {
             slot: Some(44),
