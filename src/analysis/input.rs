@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::battery::Sag;
 use super::density::Density;
 use super::lean_table::LeanTable;
+use super::levelled::Level;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
 use crate::base::plain::Shown as _;
@@ -63,6 +64,9 @@ pub struct FlightInput<'a> {
     pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
+    /// Response of the vehicle whose level the flight gives; `None`: the map is inverted with the
+    /// calibration's laws.
+    pub level: Option<&'a Level>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }

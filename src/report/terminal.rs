@@ -129,6 +129,7 @@ impl Output {
         self.flock(flight);
         if let Some(map) = &flight.map {
             self.map(map);
+            self.levelled(map, flight.indicator.unit());
         }
         for line in statistics_lines(flight) {
             self.wrapped("", "  ", &line);
@@ -354,6 +355,14 @@ impl Output {
             );
         }
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
+    }
+
+    /// Level and comparison of a map by a vehicle's response.
+    fn levelled(&mut self, map: &UpdraftMap, unit: &str) {
+        let Some(levelled) = &map.levelled else { return };
+        for words in levelled.level_words(unit).into_iter().chain(levelled.held_out_words()) {
+            self.wrapped("", "  ", &clean(&words));
+        }
     }
 
     /// The map as numbers, forward up and left to the left; nothing where places form no small grid.

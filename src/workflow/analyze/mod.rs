@@ -116,6 +116,7 @@ impl<'a> Analysing<'a> {
             || provenance.then(|| self::provenance(host, work, settings.words())),
         );
         let mut analysis = analysis.map_err(|error| WorkflowError::Nothing(error.to_string()))?;
+        outcome::refuse_level(&analysis)?;
         progress.finish();
         analysis.warnings.extend(work.absent.iter().cloned().map(Warning::Failed));
         analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
@@ -146,6 +147,7 @@ fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightI
         sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
         true_air: flight.true_air.as_ref(),
         lean_table: flight.lean_table.as_ref().filter(|_| !without.wind),
+        level: flight.level.as_ref(),
         folder: Some(&work.root),
     }
 }

@@ -67,6 +67,7 @@ pub(super) fn found_flight(
         lean_table: vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
+        level: None,
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),
