@@ -585,6 +585,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         common: aware.map(|aware| aware.common(&measured)),
         truth: truth::check(&drones),
         levelled,
+        combined: None,
         drones,
         posterior: None,
     };

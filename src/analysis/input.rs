@@ -75,9 +75,13 @@ impl FlightInput<'_> {
     /// Without the corrections that are known for pulses alone.
     pub(super) fn for_indicator(&self, indicator: Indicator) -> Self {
         match indicator {
-            Indicator::Pulse => *self,
+            Indicator::Pulse => {
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self { lean_table, ..*self }
+            }
             Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self { density: None, leaning: None, sag: None, lean_table, ..*self }
             }
         }
     }

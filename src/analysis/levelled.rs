@@ -28,6 +28,8 @@ const NORMAL: f64 = 1.96;
 const BESIDE_M: f64 = 10.0;
 /// The air is not carried past slower than this, m/s. Chosen.
 const SLOWEST_MPS: f64 = 0.5;
+/// Wind where the response does not tell it from the leans, m/s: a usual day's. Chosen.
+const UNKNOWN_WIND_MPS: f64 = 3.0;
 /// Standard error of the air's density between a calibration and another flight that is not of the same record,
 /// relative: 6 K of temperature. Chosen.
 const DAY_DENSITY: f64 = 0.02;
@@ -87,8 +89,9 @@ pub(super) fn measure(
         let slope = laws.linear.as_ref()?.parameters.first()?.estimate;
         (slope.value > 0.0).then_some((slope.value, slope.se / slope.value))
     });
-    let of_line = line
-        .map(|(slope, share)| Response::line("line of the calibration".to_owned(), slope, share));
+    let of_line = line.map(|(slope, share)| {
+        Response::line("calibration's straight line".to_owned(), slope, share)
+    });
     let response = level.response.as_ref().or(of_line.as_ref()).ok_or(Cause::NoResponse)?;
     let windows = shared.reference.map(|reference| windows_of(reference, name));
     let windows: &[&WindowStats] = windows.as_deref().unwrap_or_default();
@@ -177,6 +180,7 @@ pub(super) fn measure(
     let distance_m = level.distance_m.unwrap_or(BESIDE_M);
     let wind_mps = mean(found.moments.iter().flatten().map(|moment| moment.wind_mps));
     let wind_mps = wind_mps.unwrap_or_default();
+    let carried_mps = if response.lean_deg.len() > 1 { wind_mps } else { UNKNOWN_WIND_MPS };
     let line_slope =
         line.map_or_else(|| response.slope(0.0, 0.0).unwrap_or(slope), |(slope, _)| slope);
     let levelled = Levelled {
@@ -196,7 +200,7 @@ pub(super) fn measure(
             noise_mps,
             gain,
             integral_time_s: steady.map_or(0.0, |steady| steady.time_s.value),
-            apart_mps: apart_mps(steady, distance_m, wind_mps),
+            apart_mps: apart_mps(steady, distance_m, carried_mps),
         },
     };
     let measured = Measured {

@@ -15,6 +15,7 @@ pub mod calibrate;
 mod cause;
 mod caution;
 mod caution_battery;
+pub mod combine;
 mod corrections;
 #[cfg(test)]
 mod coverage_tests;

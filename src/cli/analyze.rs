@@ -143,6 +143,9 @@ enum IndicatorChoice {
     Rpm,
     /// Electrical power (BAT: voltage times current)
     Power,
+    /// The pulse width, and a map of all that the logs hold together, by the errors that the
+    /// calibration shows of each
+    All,
 }
 
 impl From<Indicator> for IndicatorChoice {
@@ -185,7 +188,7 @@ impl AnalyzeOptions {
             TiltChoice::Thrust => Tilt::Thrust,
         };
         options.indicator = match self.indicator {
-            IndicatorChoice::Pulse => Indicator::Pulse,
+            IndicatorChoice::Pulse | IndicatorChoice::All => Indicator::Pulse,
             IndicatorChoice::Rpm => Indicator::RotorSpeed,
             IndicatorChoice::Power => Indicator::Power,
         };
@@ -203,7 +206,7 @@ impl AnalyzeOptions {
         options.air_aware = !self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
-        Settings { options, without }
+        Settings { options, without, combine: self.indicator == IndicatorChoice::All }
     }
 }
 

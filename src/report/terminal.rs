@@ -274,7 +274,7 @@ impl Output {
             "",
             "  ",
             &format!(
-                "vertical air speed W*, m/s: mean {} {}, {} ({} law)",
+                "vertical air speed W*, m/s: mean {} {}, {} ({})",
                 signed(air.mean, 3),
                 air.error.words(3),
                 match air.n {
@@ -287,7 +287,10 @@ impl Output {
                         signed(air.highest, 2)
                     ),
                 },
-                map.law.name(),
+                match &map.levelled {
+                    Some(_) => "a response with its level fitted".to_owned(),
+                    None => format!("{} law", map.law.name()),
+                },
             ),
         );
         if let Some(reason) = &map.law_reason {
@@ -357,10 +360,13 @@ impl Output {
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
     }
 
-    /// Level and comparison of a map by a vehicle's response.
+    /// Level and comparison of a map by a vehicle's response, and what several indicators say together.
     fn levelled(&mut self, map: &UpdraftMap, unit: &str) {
-        let Some(levelled) = &map.levelled else { return };
-        for words in levelled.level_words(unit).into_iter().chain(levelled.held_out_words()) {
+        let levelled = map.levelled.as_ref();
+        let of_level = levelled.map(|found| found.level_words(unit)).unwrap_or_default();
+        let held_out = levelled.map(|found| found.held_out_words()).unwrap_or_default();
+        let combined = map.combined.as_ref().map(|combined| combined.words.clone());
+        for words in of_level.into_iter().chain(held_out).chain(combined) {
             self.wrapped("", "  ", &clean(&words));
         }
     }

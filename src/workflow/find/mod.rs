@@ -36,7 +36,7 @@ use crate::flight::table::{Mapping, TableError};
 use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
-use crate::vehicle::library;
+use crate::vehicle::{Vehicle, library};
 
 /// A flight found behind a path: its logs, and what is known of it. Without a plan and a record
 /// most of it is `None`.
@@ -70,6 +70,8 @@ pub struct Found {
     pub lean_table: Option<LeanTable>,
     /// Response of the vehicle whose level the flight gives, if that was asked for.
     pub level: Option<Level>,
+    /// Vehicle whose response says what wind does to other indicators than the pulse, if it is known.
+    pub response_of: Option<Vehicle>,
     /// Scales of the simulated air, if there is any.
     pub true_air: Option<TrueAir>,
     /// Doubts about the files, one sentence each.
@@ -210,6 +212,17 @@ pub fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, WorkflowEr
         }
     }));
     Ok(shared.indicator)
+}
+
+/// What wind does to an indicator by the lean, for each flight of the work; `None` where the vehicle does not say, and
+/// for the pulse, whose tables the flights have themselves.
+pub(crate) fn lean_tables(work: &Work, indicator: Indicator) -> Vec<Option<LeanTable>> {
+    let of = |flight: &Found| {
+        let vehicle = flight.response_of.as_ref().filter(|_| indicator != Indicator::Pulse)?;
+        let response = response::response(vehicle, indicator).ok()?;
+        Some(leaning::lean_table_of(&response, indicator))
+    };
+    work.flights.iter().map(of).collect()
 }
 
 /// Wish for maps from a vehicle's response whose level the flights of a mapping give.

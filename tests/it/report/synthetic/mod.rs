@@ -427,6 +427,9 @@ pub(crate) fn hover() -> FlightAnalysis {
             updraft_mps: updraft,
             sd_mps: Vec::new(),
             interval_mps: Vec::new(),
+            posterior_mps: Vec::new(),
+            posterior_sd_mps: Vec::new(),
+            posterior_mean: None,
             quality: Vec::new(),
             truth_mps: Some(truth),
         }));
@@ -492,6 +495,9 @@ pub(crate) fn hover() -> FlightAnalysis {
             calibration_air: None,
             common: None,
             truth: None,
+            levelled: None,
+            combined: None,
+            posterior: None,
         }),
     }
 }
