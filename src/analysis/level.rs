@@ -75,7 +75,7 @@ pub struct HeldOut {
 }
 
 impl LevelledMap {
-    /// What the map's law is, in a phrase.
+    /// Phrase about the map's law.
     pub fn words(&self) -> String {
         let level = match self.zero_s {
             Some([from, to]) => format!(
@@ -86,7 +86,7 @@ impl LevelledMap {
         format!("the response of the {} with its level fitted to {level}", self.response)
     }
 
-    /// What the levels are, one sentence for each of the first drones.
+    /// Sentences about the levels of the first drones.
     pub fn level_words(&self, unit: &str) -> Vec<String> {
         let one = |drone: &DroneLevel| {
             let wind = if drone.wind_mps > 0.0 {
@@ -108,7 +108,7 @@ impl LevelledMap {
         self.drones.iter().take(MOST_TOLD).map(one).collect()
     }
 
-    /// How the map compares with an instrument where it took nothing from, in two sentences; empty without one.
+    /// Two sentences about the errors outside of the zero stretch; empty without a true air.
     pub fn held_out_words(&self) -> Vec<String> {
         let Some(held) = &self.held_out else { return Vec::new() };
         let over = |errors: &HeldOutErrors| {

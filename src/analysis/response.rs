@@ -1,4 +1,4 @@
-//! What a vehicle's rotor effort answers to climb and wind: a table of steady flight.
+//! Response of a vehicle's rotor effort to climb and wind: a table of steady flight.
 //!
 //! The table is made of the vehicle's own plant (`workflow/find/response.rs`), so that the curve, its steepening in
 //! wind and the lift that wind gives are those that the simulator flies. Only its level is not taken from it: no file
@@ -21,7 +21,7 @@ pub struct Response {
     pub effort: Vec<Vec<f64>>,
     /// Standard error of the change with the climb, as a share of it.
     pub slope_share: f64,
-    /// The same vehicle with what is in doubt about it changed by a standard error, one doubt each.
+    /// Responses of the same vehicle with one doubtful property changed by a standard error each.
     pub doubts: Vec<Response>,
 }
 

@@ -30,7 +30,7 @@ const OPEN_SHARE: f64 = 0.8;
 /// A quantity with its posterior median and 95 % interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Known {
-    /// Median.
+    /// Median of the posterior.
     pub value: f64,
     /// 95 % interval.
     pub interval: [f64; 2],
