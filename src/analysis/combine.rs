@@ -82,11 +82,19 @@ pub fn combine(seen: &[(&FlightAnalysis, &FlightAnalysis)]) -> Option<CombinedMa
         return None;
     }
     let n = maps.len();
-    let covariance = covariance(&rows, n);
-    let weights = least_variance(&covariance)?;
-    let residual_mps = (weights.transpose() * &covariance * &weights)[(0, 0)].max(0.0).sqrt();
+    // Errors as they were seen; believed is less of what goes together, which would make weights wild.
+    let covariance = covariance_of(&rows, n, 1.0);
+    let believed = 1.0 - ((n + 1) as f64 / rows.len() as f64).min(1.0);
     let sd = |index: usize| covariance[(index, index)].max(0.0).sqrt();
-    let best_mps = (0..n).map(sd).fold(f64::INFINITY, f64::min);
+    let best = (0..n).min_by(|one, other| sd(*one).total_cmp(&sd(*other)))?;
+    let weights = least_variance(&covariance_of(&rows, n, believed))?;
+    let together_mps = (weights.transpose() * &covariance * &weights)[(0, 0)].max(0.0).sqrt();
+    let lowers = together_mps < (1.0 - WORTH) * sd(best);
+    // Weights that lower nothing are not used.
+    let best_alone = DVector::from_fn(n, |index, _| if index == best { 1.0 } else { 0.0 });
+    let weights = if lowers { weights } else { best_alone };
+    let best_mps = sd(best);
+    let residual_mps = if lowers { together_mps } else { best_mps };
     let first = maps.first()?;
     let drones: Vec<CombinedDrone> =
         first.drones.iter().filter_map(|drone| together(drone, first, &maps, &weights)).collect();
@@ -119,7 +127,7 @@ pub fn combine(seen: &[(&FlightAnalysis, &FlightAnalysis)]) -> Option<CombinedMa
             .collect(),
         windows: rows.len(),
         residual_mps,
-        lowers: residual_mps < (1.0 - WORTH) * best_mps,
+        lowers,
         drones,
         truth: truth::check(&checked),
         words: String::new(),
@@ -158,12 +166,11 @@ fn residuals_mps(calibrations: &[&FlightAnalysis]) -> Vec<Vec<f64>> {
     rows
 }
 
-/// Covariance of the indicators' errors. What goes together by chance is taken out of the correlations: with few windows
-/// they would be believed too much.
-fn covariance(rows: &[Vec<f64>], n: usize) -> DMatrix<f64> {
+/// Covariance of the indicators' errors, of which a share is believed off the diagonal: with few windows errors go
+/// together by chance.
+fn covariance_of(rows: &[Vec<f64>], n: usize, believed: f64) -> DMatrix<f64> {
     let centre: Vec<f64> =
         (0..n).map(|column| mean(rows.iter().map(|row| row[column])).unwrap_or_default()).collect();
-    let believed = 1.0 - ((n + 1) as f64 / rows.len() as f64).min(1.0);
     DMatrix::from_fn(n, n, |row, column| {
         let product = |one: &Vec<f64>| (one[row] - centre[row]) * (one[column] - centre[column]);
         let value = mean(rows.iter().map(product)).unwrap_or_default();
@@ -229,7 +236,10 @@ fn sentence(found: &CombinedMap, best_mps: f64) -> String {
             100.0 * (1.0 - found.residual_mps / best_mps)
         )
     } else {
-        format!("together {:.3} m/s: no better than the best alone", found.residual_mps)
+        format!(
+            "together no better than the best alone, {:.3} m/s, which stands",
+            found.residual_mps
+        )
     };
     format!(
         "several indicators, by what {} windows of the calibration leave over: {}; {verdict}{truth}",
@@ -284,7 +294,7 @@ mod tests {
 
     #[test]
     fn weights_are_those_of_the_least_variance() {
-        let covariance = covariance(&rows(4000), 2);
+        let covariance = covariance_of(&rows(4000), 2, 1.0);
         let weights = least_variance(&covariance).unwrap();
         // Own variances 0.09 and 0.0225, whatever is shared: a fifth and four fifths.
         assert!((weights[0] - 0.2).abs() < 0.02, "{weights}");
@@ -295,13 +305,11 @@ mod tests {
     }
 
     #[test]
-    fn few_windows_are_believed_less() {
+    fn a_share_of_what_goes_together_is_believed() {
         let rows = rows(12);
-        let believed = covariance(&rows, 2);
-        let all: Vec<Vec<f64>> = rows.iter().cycle().take(12_000).cloned().collect();
-        let whole = covariance(&all, 2);
-        assert!((believed[(0, 1)] / whole[(0, 1)] - 0.75).abs() < 1e-3);
-        assert!((believed[(0, 0)] / whole[(0, 0)] - 1.0).abs() < 1e-9);
+        let (half, whole) = (covariance_of(&rows, 2, 0.5), covariance_of(&rows, 2, 1.0));
+        assert!((half[(0, 1)] / whole[(0, 1)] - 0.5).abs() < 1e-9);
+        assert_eq!(half[(0, 0)], whole[(0, 0)]);
         assert_eq!(least_variance(&DMatrix::zeros(2, 2)), None);
     }
 }

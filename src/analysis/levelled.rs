@@ -103,7 +103,7 @@ pub(super) fn measure(
     let found = through(response, &seconds, windows, level.zero_s).ok_or_else(|| {
         level.zero_s.map_or(Cause::Gaps, |zero_s| Cause::ZeroOutside { zero_s, hover_s })
     })?;
-    // The level's mean settles with the air, and what is left of the air in the noise does so in a tenth of the time.
+    // A level from a stretch is off by the mean of the air over it.
     let steady = settled(response, flight, &seconds, found.level, level.zero_s);
     let stretch = |index: usize| {
         let time_s = (seconds.first_s + index as i64) as f64;
@@ -131,7 +131,7 @@ pub(super) fn measure(
         .collect();
     let doubted = doubts
         .iter()
-        .filter_map(|doubt| Moments::of(&in_stretch(doubt)).and_then(|moments| moments.variance()));
+        .filter_map(|doubt| Moments::of(in_stretch(doubt)).and_then(|moments| moments.variance()));
     let noise_mps = (white_mps * white_mps + doubted.sum::<f64>()).sqrt();
     let gain = if sd_mps > 0.0 { (1.0 - (noise_mps / sd_mps).powi(2)).max(0.0) } else { 0.0 };
     let zero_length_s = level.zero_s.map(|[from, to]| to - from);
@@ -152,7 +152,7 @@ pub(super) fn measure(
     let sd_at = |index: usize, value: f64| {
         let of_doubts = doubts.iter().filter_map(|doubt| doubt.get(index).copied().flatten());
         let doubts = of_doubts.fold(0.0, |sum: f64, doubt| sum.hypot(gain * doubt));
-        // What the gain leaves out, and what it lets in.
+        // Of the noise the gain leaves this much; a known doubt in this second may be more.
         let left_mps = gain.sqrt() * noise_mps;
         left_mps.max(own_mps.hypot(doubts)).hypot(level_se_mps).hypot(response.slope_share * value)
     };

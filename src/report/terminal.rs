@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, UpdraftMap};
 use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
@@ -364,7 +364,7 @@ impl Output {
     fn levelled(&mut self, map: &UpdraftMap, unit: &str) {
         let levelled = map.levelled.as_ref();
         let of_level = levelled.map(|found| found.level_words(unit)).unwrap_or_default();
-        let held_out = levelled.map(|found| found.held_out_words()).unwrap_or_default();
+        let held_out = levelled.map(LevelledMap::held_out_words).unwrap_or_default();
         let combined = map.combined.as_ref().map(|combined| combined.words.clone());
         for words in of_level.into_iter().chain(held_out).chain(combined) {
             self.wrapped("", "  ", &clean(&words));

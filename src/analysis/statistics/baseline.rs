@@ -85,21 +85,22 @@ fn sentence(found: &Baseline) -> String {
     let of = |one: &BaselineOf| {
         let mut text = String::new();
         for (index, needed) in one.needed.iter().enumerate() {
-            let lead = if index > 0 { ", and to " } else { "" };
-            let _ = write!(text, "{lead}{} m/s {}", needed.error_mps, minutes(needed, one.is_open));
+            let lead = if index > 0 { ", and " } else { "" };
+            let _ =
+                write!(text, "{lead}{} for {} m/s", minutes(needed, one.is_open), needed.error_mps);
         }
         text
     };
     let drone = &found.drone;
+    let Interval { low, high } = drone.integral_time_interval_s;
     let time = if drone.is_open {
-        format!("longer than {:.0} s", drone.integral_time_interval_s.low)
+        format!("longer than {low:.0} s")
     } else {
-        let Interval { low, high } = drone.integral_time_interval_s;
-        format!("{:.0} s (95 %: {low:.0} to {high:.0})", drone.integral_time_s)
+        format!("of {:.0} s (95 %: {low:.0} to {high:.0})", drone.integral_time_s)
     };
     let mut text = format!(
-        "A drone's baseline needs, for its mean to be known to {} (standard error σ √(2 T/t) of a \
-         mean over t, for air of σ = {:.2} m/s with an integral time T of {time})",
+        "A drone's baseline needs {}: the mean over t has a standard error of σ √(2 T/t), in air of σ = {:.2} m/s \
+         with an integral time T {time}",
         of(drone),
         drone.sd_mps
     );

@@ -146,10 +146,12 @@ fn with_others(
         let tables = lean_tables(work, indicator);
         let inputs = inputs(work, &tables, settings.without);
         let options = AnalysisOptions { indicator, ..settings.options.clone() };
+        // Laws that are held are of one indicator.
+        let reference = reference.filter(|held| held.indicator == indicator);
         match analyze(&work.title, &inputs, &options, reference, &|_, _| {}) {
             Ok(other) => all.push(other),
             Err(error) => {
-                host.warn(&format!("the map is made without {}: {error}", indicator.words()))
+                host.warn(&format!("the map is made without {}: {error}", indicator.words()));
             }
         }
     }
