@@ -19,6 +19,7 @@ use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf, Symbol};
+use super::levelled;
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
@@ -28,7 +29,7 @@ use super::refer::refer_calibration;
 use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    TableRow, Unmeasured, UpdraftMap, WindCorrection, WindowStats,
+    LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindowStats,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
@@ -201,6 +202,7 @@ pub fn analyze_flight(
         unknown_share: 0.0,
     };
     let aware = reference
+        .filter(|_| input.level.is_none())
         .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
         .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
     let map_law = options
@@ -274,7 +276,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         Purpose::Calibration => fleet_laws(shared, &mut drones, &mut warnings),
         Purpose::Measurement => FleetLaws::default(),
     };
-    if purpose == Purpose::Measurement && shared.reference.is_none() {
+    if purpose == Purpose::Measurement && shared.reference.is_none() && input.level.is_none() {
         warnings.push(Warning::NoCalibration);
         let most = climbed.iter().copied().max_by_key(|(up, down)| up + down);
         let most = most.filter(|_| shared.planned_purpose.is_none());
@@ -459,7 +461,8 @@ fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
     let calibration = shared.reference.filter(|_| shared.aware.is_some());
     let battery = calibration.filter(|_| shared.input.sag.is_some());
     warnings.extend(battery.and_then(|found| battery_caution(map, found)));
-    warnings.extend(shared.aware.is_none().then_some(Warning::PlainMap));
+    let is_plain = shared.aware.is_none() && shared.input.level.is_none();
+    warnings.extend(is_plain.then_some(Warning::PlainMap));
     warnings.extend(map.is_scan().then_some(Warning::Scan));
     warnings
 }
@@ -536,7 +539,10 @@ fn track_of(
 }
 
 /// Why the map's law was taken.
-fn law_reason(shared: &Shared<'_>) -> Option<String> {
+fn law_reason(shared: &Shared<'_>, levelled: Option<&LevelledMap>) -> Option<String> {
+    if let Some(levelled) = levelled {
+        return Some(levelled.words());
+    }
     if shared.options.map_law.is_some() {
         return Some(ASKED_FOR.to_owned());
     }
@@ -557,6 +563,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         (None, Some(own)) => own.at(&times),
         (None, None) => shared.input.truth?.get(&slot?)?.at(&times),
     };
+    let own_truth: Vec<Option<TruthSeries>> =
+        updrafts.iter().map(|named| named.5.clone()).collect();
+    let levelled = levelled::of_map(&series.iter().collect::<Vec<_>>(), &own_truth);
     let measured: Vec<&Measured> =
         series.iter().filter_map(|series| series.measured.as_ref()).collect();
     let aware = shared.aware.as_ref().filter(|_| !measured.is_empty());
@@ -598,8 +607,12 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         .collect();
     let map = UpdraftMap {
         law: shared.map_law.unwrap_or(LawKind::Linear),
-        law_reason: law_reason(shared),
+        law_reason: law_reason(shared, levelled.as_ref()),
         wind: match (shared.input.leaning, shared.input.lean_table) {
+            _ if shared.input.level.is_some() => {
+                let response = shared.input.level.and_then(|level| level.response.as_ref());
+                response.map(|_| WindCorrection::Physics)
+            }
             (Some(_), _) => Some(WindCorrection::Drag),
             (None, table) => {
                 table.filter(|_| shared.aware.is_some()).map(|_| WindCorrection::Physics)
@@ -613,6 +626,8 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         calibration_air: aware.map(|aware| aware.zero.air),
         common: aware.map(|aware| aware.common(&measured)),
         truth: truth::check(&drones),
+        levelled,
+        combined: None,
         drones,
         posterior: None,
         thermals: Vec::new(),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::battery::Sag;
 use super::density::Density;
 use super::lean_table::LeanTable;
+use super::levelled::Level;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
 use crate::base::plain::Shown as _;
@@ -63,6 +64,9 @@ pub struct FlightInput<'a> {
     pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
+    /// Response of the vehicle whose level the flight gives; `None`: the map is inverted with the
+    /// calibration's laws.
+    pub level: Option<&'a Level>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
@@ -71,9 +75,13 @@ impl FlightInput<'_> {
     /// Without the corrections that are known for pulses alone.
     pub(super) fn for_indicator(&self, indicator: Indicator) -> Self {
         match indicator {
-            Indicator::Pulse => *self,
+            Indicator::Pulse => {
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self { lean_table, ..*self }
+            }
             Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self { density: None, leaning: None, sag: None, lean_table, ..*self }
             }
         }
     }

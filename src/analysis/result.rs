@@ -8,6 +8,7 @@ pub use super::budget::{
     TruthCheck,
 };
 use super::cause::Cause;
+pub use super::combine::{CombinedDrone, CombinedIndicator, CombinedMap};
 use super::density::Density;
 pub use super::fit_warning::FitWarning;
 pub use super::fitted::{Fit, Laws, Parameter};
@@ -15,6 +16,7 @@ pub use super::headline::{BentLine, Headline};
 pub use super::hold::HeldCurve;
 use super::kind::{LawKind, LawOf};
 pub use super::ladder::{Ladder, PartialLadder};
+pub use super::level::{DroneLevel, HeldOut, HeldOutErrors, LevelledMap};
 use super::offset::OffsetMap;
 use super::statistics::result::FieldStatistics;
 pub use super::stats::SampleStats;
@@ -295,6 +297,12 @@ pub struct UpdraftMap {
     /// Comparison with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+    /// Set where the law is a vehicle's response with its level fitted to the flight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levelled: Option<LevelledMap>,
+    /// The map from several indicators together, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub combined: Option<CombinedMap>,
     /// The map as one estimate of all drones, seconds and the calibration together; absent: too few values, or
     /// drones without places or errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -199,6 +199,9 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
     if let Some(wind) = &of.wind {
         say(&wind.words);
     }
+    if let Some(baseline) = &of.baseline {
+        say(&baseline.words);
+    }
     let record = &of.record;
     context! {
         rows,

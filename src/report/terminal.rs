@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, UpdraftMap};
 use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
@@ -133,6 +133,7 @@ impl Output {
         self.flock(flight);
         if let Some(map) = &flight.map {
             self.map(map);
+            self.levelled(map, flight.indicator.unit());
         }
         for line in statistics_lines(flight) {
             self.wrapped("", "  ", &line);
@@ -295,7 +296,7 @@ impl Output {
             "",
             "  ",
             &format!(
-                "vertical air speed W*, m/s: mean {} {}, {} ({} law)",
+                "vertical air speed W*, m/s: mean {} {}, {} ({})",
                 signed(air.mean, 3),
                 air.error.words(3),
                 match air.n {
@@ -308,7 +309,10 @@ impl Output {
                         signed(air.highest, 2)
                     ),
                 },
-                map.law.name(),
+                match &map.levelled {
+                    Some(_) => "a response with its level fitted".to_owned(),
+                    None => format!("{} law", map.law.name()),
+                },
             ),
         );
         if let Some(reason) = &map.law_reason {
@@ -379,6 +383,17 @@ impl Output {
             self.wrapped("", "  ", &thermal.sentence());
         }
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
+    }
+
+    /// Level and comparison of a map by a vehicle's response, and what several indicators say together.
+    fn levelled(&mut self, map: &UpdraftMap, unit: &str) {
+        let levelled = map.levelled.as_ref();
+        let of_level = levelled.map(|found| found.level_words(unit)).unwrap_or_default();
+        let held_out = levelled.map(LevelledMap::held_out_words).unwrap_or_default();
+        let combined = map.combined.as_ref().map(|combined| combined.words.clone());
+        for words in of_level.into_iter().chain(held_out).chain(combined) {
+            self.wrapped("", "  ", &clean(&words));
+        }
     }
 
     /// The map as numbers, forward up and left to the left; nothing where places form no small grid.

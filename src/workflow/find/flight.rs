@@ -61,12 +61,16 @@ pub(super) fn found_flight(
         notes.extend(doubts);
         start
     };
+    let pulse_table = vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle));
+    let has_table = pulse_table.is_some();
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         sag: sag(flown.is_some(), vehicle.as_ref()),
-        lean_table: vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle)),
+        lean_table: pulse_table,
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
+        level: None,
+        response_of: vehicle.clone().filter(|_| has_table),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),

@@ -1,12 +1,14 @@
 //! Lean of simulated drones in wind, from the vehicle that was flown.
 
 use crate::analysis::lean_table::LeanTable;
+use crate::analysis::response::Response;
 use crate::analysis::wind::Leaning;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::base::digest::sha256;
 use crate::campaign::FlightRecord;
 use crate::effects::select::without;
 use crate::effects::{Model, Role, Signal, Signals};
+use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::sim::plant::GRAVITY;
 use crate::sim::plant::drag::Drag;
@@ -70,6 +72,7 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
     let doubt_us =
         (0..LEANS).map(|row| (0..CLIMBS).map(|column| doubt(row, column)).collect()).collect();
     Some(LeanTable {
+        indicator: Indicator::Pulse,
         lean_step_deg: LEAN_STEP_DEG,
         first_climb_mps: FIRST_CLIMB_MPS,
         climb_step_mps: CLIMB_STEP_MPS,
@@ -77,6 +80,34 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
         wind_mps,
         doubt_us,
     })
+}
+
+/// What wind does to another indicator than the pulse by the lean, from the vehicle's response.
+pub(super) fn lean_table_of(response: &Response, indicator: Indicator) -> LeanTable {
+    let change = |of: &Response, row: usize, column: usize| {
+        let climb_mps = FIRST_CLIMB_MPS + column as f64 * CLIMB_STEP_MPS;
+        let wind_mps = of.wind_mps(row as f64 * LEAN_STEP_DEG);
+        let change = of.effort(wind_mps, climb_mps).zip(of.effort(0.0, climb_mps));
+        // No steady flight there, and nothing measures there.
+        change.map_or(0.0, |(windy, calm)| windy - calm)
+    };
+    let doubt = |row: usize, column: usize| {
+        let known = change(response, row, column);
+        let others = response.doubts.iter().map(|other| change(other, row, column) - known);
+        others.fold(0.0, f64::hypot)
+    };
+    let table = |of: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+        (0..LEANS).map(|row| (0..CLIMBS).map(|column| of(row, column)).collect()).collect()
+    };
+    LeanTable {
+        indicator,
+        lean_step_deg: LEAN_STEP_DEG,
+        first_climb_mps: FIRST_CLIMB_MPS,
+        climb_step_mps: CLIMB_STEP_MPS,
+        change_us: table(&|row, column| change(response, row, column)),
+        wind_mps: (0..LEANS).map(|row| response.wind_mps(row as f64 * LEAN_STEP_DEG)).collect(),
+        doubt_us: table(&doubt),
+    }
 }
 
 /// Change of the pulse by wind, for each lean and vertical air speed of the table, us, and the wind of

@@ -502,6 +502,8 @@ pub(crate) fn hover() -> FlightAnalysis {
             calibration_air: None,
             common: None,
             truth: None,
+            levelled: None,
+            combined: None,
             posterior: None,
             thermals: Vec::new(),
         }),
