@@ -75,6 +75,8 @@ pub(crate) fn whole_campaign() -> Analysis {
         rms_without_bias_mps: 0.095,
         inside_share: 0.953,
         means_inside_share: 0.976,
+        limit_rms_mps: None,
+        at_limit_rms_mps: None,
     });
     analysis
 }
