@@ -111,7 +111,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Air of a kind in the first (calibration) or second flight.
 fn air(kind: &str, flight: usize) -> Option<AirSettings> {
     let field = |sd_mps, length_m, time_s, is_advected| {
-        Some(FieldSettings { sd_mps, length_m, time_s, is_advected })
+        Some(FieldSettings { sd_mps, length_m, time_s, is_advected, waves: Some(200) })
     };
     let still = AirSettings {
         updraft_mps: 0.0,
