@@ -130,9 +130,9 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
     };
     Some(match kind {
         "still" => still,
-        "field" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
+        // `noisy` has noise of the pulses besides.
+        "field" | "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "gusty" => AirSettings { field: field(0.5, 145.0, 186.0, false), own_mps: 0.25, ..still },
-        "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }
