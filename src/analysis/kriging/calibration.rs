@@ -10,6 +10,7 @@ use super::covariance::{Air, Covariance, Form};
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
+use crate::numeric::extent;
 
 /// How much stronger the air of the calibration may have been than that of the hover, with weights: hours
 /// apart the air differs by such factors. Chosen.
@@ -141,6 +142,12 @@ impl<'a> Calibration<'a> {
             }
         }
         found
+    }
+
+    /// From the first window to the last, s.
+    pub(super) fn span_s(&self) -> f64 {
+        extent(self.windows.cells.iter().map(|cell| cell.time_s))
+            .map_or(0.0, |(first, last)| last - first)
     }
 
     /// The fleet's law in air of known scales, alike in all directions and as strong as they say.

@@ -53,6 +53,19 @@ pub(in super::super) struct Air {
     pub(in super::super) gust_s: f64,
 }
 
+impl Air {
+    /// How long the field stays the same at one place, s: its integral time, by its own changes and by what drifts past.
+    pub(super) fn stays_s(&self) -> f64 {
+        let [u, v] = self.drift_mps;
+        let rate = (1.0 / self.time_s).hypot(u.hypot(v) / self.length_m);
+        let integral = match self.form {
+            Form::Exponential => 1.0,
+            Form::Gaussian => 0.5 * std::f64::consts::PI.sqrt(),
+        };
+        integral / rate
+    }
+}
+
 /// A place (show frame, z up, m) at a time (s), and whose it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {

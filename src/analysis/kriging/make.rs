@@ -24,6 +24,8 @@ const FEWEST: usize = 24;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
 /// Over level ground there is none in the long run. Chosen.
 const UNIFORM_SHARE: f64 = 0.2;
+/// Fewer independent pieces of the air are not counted: the expansion of [`widened`] ends there. Numerical.
+const FEWEST_PIECES: f64 = 1.5;
 /// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
@@ -132,6 +134,8 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     } else {
         mixed(&samples)?
     };
+    let seen_s = input.seconds as f64 + input.calibration.span_s();
+    let covariance = widened(&covariance, &air, seen_s);
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
     let model = Model { drones: input.drones, covariance: Covariance::new(air), linear };
@@ -233,6 +237,18 @@ fn mixed(samples: &[(Sample, Vec<Choice>)]) -> Option<(CommonVector, Common, f64
     let uniform =
         weighed.iter().filter(|(_, choice)| choice.is_uniform).map(|(weight, _)| weight).sum();
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
+}
+
+/// The covariance of the common errors with a wider zero where the record shows few independent pieces of the air: of two
+/// or three nobody learns how strong it is, and errors have the tails of Student's t with as many degrees of freedom
+/// (its 97.5 % quantile by the expansion of Abramowitz and Stegun 26.7.5).
+fn widened(covariance: &Common, air: &Air, seen_s: f64) -> Common {
+    let freedom = (seen_s / (2.0 * air.stays_s())).max(FEWEST_PIECES);
+    let wider = 1.0 + 1.21 / freedom + 1.44 / (freedom * freedom);
+    let by = CommonVector::from_fn(
+        |row, _| if row < PARAMETERS || row == UNIFORM { wider } else { 1.0 },
+    );
+    covariance.component_mul(&(by * by.transpose()))
 }
 
 /// A scale that is searched as a logarithm.
