@@ -6,6 +6,8 @@
 //! updraft analyze FOLDER
 //! ```
 //!
+//! More arguments set values of the campaign's templates: `'calibration.legs.speeds_mps=[3, 6]'`.
+//!
 //! The kind is `still`, `field`, `gusty`, `advected` or `wind-change`. `truth.csv` has the mean of the true vertical air
 //! speed over the 10 s around each second of the hover.
 
@@ -17,8 +19,8 @@ use std::path::PathBuf;
 
 use foreign_worlds::World;
 use foreign_worlds::air::{Air, AirSettings, FieldSettings, Shear};
-use updraft::blind::scenario::{AirClass, Base, Cell, Protocol, Worlds};
-use updraft::blind::worlds::draw;
+use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
+use updraft::blind::worlds::{Worlds, draw};
 use updraft::blind::worlds::fly::{Settings, fly_plan};
 use updraft::campaign;
 use updraft::mission::Plan;
@@ -41,13 +43,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let (seed, root) = (seed.parse::<u64>()?, PathBuf::from(folder));
-    let overrides = [
+    let more: Result<Vec<Override>, _> = words.map(|word| Override::parse(&word)).collect();
+    let mut overrides = vec![
         Override::new("grid.rows", 5),
         Override::new("grid.columns", 5),
         Override::new("grid.spacing_m", 10.0),
         Override::new("duration_s", 300.0),
         Override::new("vehicle", "pixel"),
     ];
+    overrides.extend(more?);
     let planned = mission::resolve("campaign", &overrides)?;
     let host = Quiet::default();
     plan::write(&host, &planned, &plan::shows(&planned), &root, false)?;
@@ -141,7 +145,7 @@ fn truth(plan: &Plan, world: &World, air_seed: u64) -> String {
             continue;
         };
         let (start, end) = (hover.start_ms as usize / 1000, hover.end_ms as usize / 1000);
-        let place_m = [slot.home_m[0], slot.home_m[1], hover.end_altitude_m];
+        let place_m = [slot.home_m[0], slot.home_m[1], hover.from_m[2]];
         let mut around = air.around(slot.slot);
         let seconds: Vec<f64> = (start * STEPS..end * STEPS)
             .map(|step| around.velocity_mps(place_m, (step as f64 + 0.5) / STEPS as f64)[2])

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
-use super::aware::{ASKED_FOR, Aware};
+use super::aware::{ASKED_FOR, Aware, TYPICAL_SLOPE};
 use super::calibrate::{self, FitOptions};
 use super::cause::Cause;
 use super::caution::{fit_cautions, tilt_caution, wind_caution};
@@ -26,7 +26,7 @@ use super::refer::refer_calibration;
 use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    TableRow, Unmeasured, UpdraftMap, WindCorrection, WindowStats,
+    TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
@@ -37,6 +37,7 @@ use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
+use super::wind_forms::{Belief, WindForms};
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
@@ -191,10 +192,14 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
+    let lean_table = input.wind_forms.map(|forms| {
+        let legs = reference.and_then(|reference| reference.wind_legs.as_ref());
+        forms.table(&believed(forms, legs, reference))
+    });
     let corrections = Corrections {
         density: input.density,
         leaning: input.leaning,
-        lean_table: input.lean_table,
+        lean_table: lean_table.as_ref(),
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
     };
@@ -205,8 +210,17 @@ pub fn analyze_flight(
         .map_law
         .or_else(|| aware.as_ref().map(Aware::law))
         .or_else(|| map_reference.map(better_law));
-    let shared =
-        Shared { input, options, reference, map_reference, planned_purpose, map_law, aware };
+    let lean_table = lean_table.as_ref();
+    let shared = Shared {
+        input,
+        options,
+        reference,
+        map_reference,
+        planned_purpose,
+        map_law,
+        aware,
+        lean_table,
+    };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
@@ -237,6 +251,19 @@ pub fn analyze_flight(
     }
     let contradictions = warnings.into_iter().map(Warning::WhoseLogs).collect();
     Ok(finish(&shared, account, contradictions))
+}
+
+/// What is believed of drag and lift after the horizontal legs, if any were flown.
+fn believed(
+    forms: &WindForms,
+    legs: Option<&WindLegs>,
+    reference: Option<&FlightAnalysis>,
+) -> Belief {
+    let Some(legs) = legs else { return forms.prior() };
+    let slope = reference
+        .and_then(|reference| reference.flock.as_ref()?.linear.as_ref()?.parameters.first())
+        .map_or(TYPICAL_SLOPE, |slope| slope.estimate.value);
+    legs.posterior(forms, slope)
 }
 
 /// Unusable logs named in an error.
@@ -277,6 +304,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
             statistics.as_ref().and_then(|found| found.wind.as_ref()),
         );
     }
+    let wind_legs = input.plan.and_then(|plan| WindLegs::of(plan, &drones));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -291,6 +319,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         table: laws.table,
         map,
         statistics,
+        wind_legs: wind_legs.filter(|_| purpose == Purpose::Calibration),
         unmeasured,
         paper_table: laws.paper,
         warnings,
@@ -429,7 +458,7 @@ fn statistics(
     seen: &[HoverSeen],
 ) -> Option<FieldStatistics> {
     let Shared { input, options, .. } = shared;
-    let drag = match (input.leaning, input.lean_table) {
+    let drag = match (input.leaning, shared.lean_table) {
         (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
         (None, Some(table)) => LeanDrag::Table(table),
         (None, None) => LeanDrag::Unknown,
@@ -557,7 +586,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
     let map = UpdraftMap {
         law: shared.map_law.unwrap_or(LawKind::Linear),
         law_reason: law_reason(shared),
-        wind: match (shared.input.leaning, shared.input.lean_table) {
+        wind: match (shared.input.leaning, shared.lean_table) {
             (Some(_), _) => Some(WindCorrection::Drag),
             (None, table) => {
                 table.filter(|_| shared.aware.is_some()).map(|_| WindCorrection::Physics)

@@ -6,6 +6,7 @@ use super::cause::Cause;
 use super::hover::Hover;
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::law::{LawKind, LawOf};
+use super::lean_table::LeanTable;
 use super::map_statistics::HoverSeen;
 use super::offset::OffsetMap;
 use super::options::AnalysisOptions;
@@ -34,6 +35,8 @@ pub(super) struct Shared<'a> {
     pub(super) map_law: Option<LawKind>,
     /// The calibration with what it tells about errors, for the map.
     pub(super) aware: Option<Aware<'a>>,
+    /// What wind does to the pulse by the lean, where it is known and is all that is.
+    pub(super) lean_table: Option<&'a LeanTable>,
 }
 
 /// What one log gave.

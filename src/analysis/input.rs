@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use super::battery::Sag;
 use super::density::Density;
-use super::lean_table::LeanTable;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
+use super::wind_forms::WindForms;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::flight::Indicator;
@@ -60,7 +60,7 @@ pub struct FlightInput<'a> {
     pub sag: Option<Sag>,
     /// Effect of wind on the vehicle's pulse, where its physics is known and
     /// [`FlightInput::leaning`] does not give it.
-    pub lean_table: Option<&'a LeanTable>,
+    pub wind_forms: Option<&'a WindForms>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
     /// Folder to which log paths are given in results.
@@ -73,7 +73,7 @@ impl FlightInput<'_> {
         match indicator {
             Indicator::Pulse => *self,
             Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
+                Self { density: None, leaning: None, sag: None, wind_forms: None, ..*self }
             }
         }
     }

@@ -145,7 +145,7 @@ fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightI
         thrust_exponent: flight.thrust_exponent,
         sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
         true_air: flight.true_air.as_ref(),
-        lean_table: flight.lean_table.as_ref().filter(|_| !without.wind),
+        wind_forms: flight.wind_forms.as_ref().filter(|_| !without.wind),
         folder: Some(&work.root),
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::files::logs_in;
-use super::leaning::{lean_table, leaning};
+use super::leaning::leaning;
 use super::of_start;
 use super::physics::{density, linear_thrust, sag};
 use super::true_scales::true_scales;
@@ -17,9 +17,11 @@ use crate::base::plain::Shown as _;
 use crate::campaign::origin::{LogOrigin, LogsAt};
 use crate::campaign::{FlightFolder, FlightRecord, LogRecord};
 use crate::mission::Plan;
+use crate::mission::plan::Purpose;
 use crate::sim::air::truth::{self, TrueUpdraft};
 use crate::vehicle::library;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::wind_forms::wind_forms;
 
 /// What a flight's folder holds.
 pub(super) fn found_flight(
@@ -64,7 +66,10 @@ pub(super) fn found_flight(
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         sag: sag(flown.is_some(), vehicle.as_ref()),
-        lean_table: vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle)),
+        wind_forms: vehicle
+            .as_ref()
+            .filter(|_| plan.purpose == Purpose::Measurement)
+            .and_then(|vehicle| wind_forms(plan.site.ground_amsl_m, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
         name: plan.name.clone(),

@@ -20,9 +20,9 @@ use super::error::WorkflowError;
 use super::hashes::Hashes;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
-use crate::analysis::lean_table::LeanTable;
 use crate::analysis::statistics::result::TrueAir;
 use crate::analysis::wind::Leaning;
+use crate::analysis::wind_forms::WindForms;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
@@ -65,7 +65,7 @@ pub struct Found {
     /// Effect of the battery on the pulse, if known.
     pub sag: Option<Sag>,
     /// Effect of wind on the pulse of a leaning drone, if known.
-    pub lean_table: Option<LeanTable>,
+    pub wind_forms: Option<WindForms>,
     /// Scales of the simulated air, if there is any.
     pub true_air: Option<TrueAir>,
     /// Doubts about the files, one sentence each.

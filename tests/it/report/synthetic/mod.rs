@@ -156,6 +156,7 @@ pub(crate) fn calibration(
         map: None,
         unmeasured: Vec::new(),
         statistics: None,
+        wind_legs: None,
         paper_table: Some(PaperTable::Simulation),
     }
 }
@@ -478,6 +479,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             ),
         }],
         statistics: None,
+        wind_legs: None,
         paper_table: None,
         map: Some(UpdraftMap {
             law: LawKind::SignedQuadratic,
