@@ -19,9 +19,10 @@ use std::path::PathBuf;
 
 use foreign_worlds::World;
 use foreign_worlds::air::{Air, AirSettings, FieldSettings, Shear};
+use foreign_worlds::hidden::HiddenEffect;
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
-use updraft::blind::worlds::{Worlds, draw};
 use updraft::blind::worlds::fly::{Settings, fly_plan};
+use updraft::blind::worlds::{Worlds, draw};
 use updraft::campaign;
 use updraft::mission::Plan;
 use updraft::mission::plan::SegmentKind;
@@ -64,7 +65,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         side: 5,
         columns: None,
     };
-    let drawn = draw::world(seed, &cell)?;
+    // Pulses follow the battery's voltage, as those of all controllers do that do not measure it.
+    let voltage = HiddenEffect { kind: "voltage".to_owned(), values: vec![1.0] };
+    let drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
     for (index, flight) in campaign::flights(&root)?.iter().enumerate() {
         let plan = flight.read_plan()?;
         let air = air(&kind, index).ok_or("this kind of air is not known")?;

@@ -150,7 +150,9 @@ impl Corrections<'_> {
             let change = table.at(raw.lean_deg, raw.climb_mps);
             let doubts = table.doubts_at(raw.lean_deg, raw.climb_mps);
             let doubts = doubts.unwrap_or_else(|| {
-                std::array::from_fn(|direction| if direction == 0 { WIND_SHARE * change } else { 0.0 })
+                std::array::from_fn(
+                    |direction| if direction == 0 { WIND_SHARE * change } else { 0.0 },
+                )
             });
             WINDS.iter().zip(doubts).for_each(|(wind, doubt)| doubts_us[*wind] = doubt);
             let at = |step: f64| table.at(raw.lean_deg, raw.climb_mps + step);

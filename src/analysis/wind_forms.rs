@@ -48,6 +48,8 @@ pub struct WindForms {
     pub first_climb_mps: f64,
     /// Step of the climb, m/s.
     pub climb_step_mps: f64,
+    /// Pulses without wind, us, by climb.
+    pub calm_us: Vec<f64>,
     /// The file's own physics.
     pub file: Response,
     /// For each doubt, what one standard error of it adds.
@@ -136,6 +138,22 @@ impl WindForms {
         };
         let climbs = response.lean.len().min(response.change_us.len());
         (0..LEANS).map(|step| (0..climbs).map(|climb| change(step, climb)).collect()).collect()
+    }
+
+    /// Standard error of a map in one wind that was calibrated in another, m/s, by these doubts alone.
+    pub(super) fn error_mps(&self, belief: &Belief, calibrated_mps: f64, wind_mps: f64) -> f64 {
+        let table = self.table(belief);
+        let lean_deg = |wind_mps| self.level(&belief.mean, wind_mps)[0].atan().to_degrees();
+        let doubts = |wind_mps| table.doubts_at(lean_deg(wind_mps), 0.0).unwrap_or_default();
+        let (there, here) = (doubts(calibrated_mps), doubts(wind_mps));
+        let apart: f64 = here.iter().zip(there).map(|(here, there)| (here - there).powi(2)).sum();
+        let row = self.level_row();
+        let calm = |row: usize| self.calm_us.get(row).copied().unwrap_or_default();
+        let step_mps = self.climb_step_mps;
+        let still = (calm(row + 1) - calm(row.saturating_sub(1))) / (2.0 * step_mps);
+        let at = |climb_mps: f64| table.at(lean_deg(wind_mps), climb_mps);
+        let slope = still + (at(step_mps) - at(-step_mps)) / (2.0 * step_mps);
+        apart.sqrt() / slope.max(1.0)
     }
 
     /// The table of a belief: its mean, with the doubts as few directions.
@@ -244,6 +262,7 @@ pub(super) mod tests {
             wind_step_mps: 0.5,
             first_climb_mps: -2.0,
             climb_step_mps: 1.0,
+            calm_us: vec![1496.0, 1522.0, 1548.0, 1574.0, 1600.0],
             file: response(&|wind| 0.02 * wind + 0.001 * wind * wind, &|wind| -0.5 * wind * wind),
             doubts: vec![
                 response(&|wind| 0.008 * wind, &|_| 0.0),

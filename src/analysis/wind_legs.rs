@@ -41,6 +41,10 @@ const FOLLOWED: usize = 3;
 const STEPS: usize = 25;
 /// Step of the numerical derivatives.
 const STEP: f64 = 1e-3;
+/// Wind of the day on which legs are flown, m/s, and standard error of a hover's mean pulse in its air, us: a calm
+/// morning. Chosen for what is told beforehand.
+const EXPECTED_WIND_MPS: f64 = 1.0;
+const EXPECTED_NOISE_US: f64 = 4.0;
 /// Fewest legs that are a calibration of the wind.
 const FEWEST: usize = 2;
 
@@ -144,6 +148,23 @@ impl WindLegs {
     }
 }
 
+/// What legs buy: standard errors of a map in a wind, m/s, that was calibrated in a light one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bought {
+    /// With the vehicle's file alone.
+    pub without_mps: f64,
+    /// With the legs.
+    pub with_mps: f64,
+}
+
+/// What legs over ground at these velocities (show frame, m/s), flown in a light wind, buy in a strong one.
+pub fn bought(forms: &WindForms, ground_mps: &[[f64; 2]], wind_mps: f64) -> Bought {
+    let legs = WindLegs::expected(forms, ground_mps, [EXPECTED_WIND_MPS, 0.0], EXPECTED_NOISE_US);
+    let error = |belief: &Belief| forms.error_mps(belief, EXPECTED_WIND_MPS, wind_mps);
+    // No level needs a slope where nothing climbs.
+    Bought { without_mps: error(&forms.prior()), with_mps: error(&legs.posterior(forms, 0.0)) }
+}
+
 /// One drone on one leg.
 struct Flown {
     lean_deg: f64,
@@ -166,9 +187,8 @@ impl Flown {
                 window.kind.is_hover() && window.rejected.is_empty() && is_near
             })
         };
-        let before = hovers().rfind(|hover| {
-            hover.end_s <= leg.start_s && hover.end_s > leg.start_s - NEAR_S
-        });
+        let before = hovers()
+            .rfind(|hover| hover.end_s <= leg.start_s && hover.end_s > leg.start_s - NEAR_S);
         let after =
             hovers().find(|hover| hover.start_s >= leg.end_s && hover.start_s < leg.end_s + NEAR_S);
         let around: Vec<&WindowStats> = before.into_iter().chain(after).collect();
@@ -202,9 +222,9 @@ fn noise_us(drones: &[DroneAnalysis]) -> f64 {
         .collect();
     let mut squares = Vec::new();
     for (index, (time_s, pulse_us, height_m)) in means.iter().enumerate() {
-        let next = means[index + 1..].iter().find(|next| {
-            (next.2 - height_m).abs() < NEAR_M && next.0 < time_s + 2.0 * NEAR_S
-        });
+        let next = means[index + 1..]
+            .iter()
+            .find(|next| (next.2 - height_m).abs() < NEAR_M && next.0 < time_s + 2.0 * NEAR_S);
         squares.extend(next.map(|next| (next.1 - pulse_us).powi(2) / 2.0));
     }
     mean(squares.into_iter()).unwrap_or_default().sqrt().max(LEAST_NOISE_US)
@@ -253,10 +273,8 @@ impl Fit<'_> {
             let air_mps = (vx - x).hypot(vy - y);
             let wanted = level(air_mps);
             let change_us = leg.change_us - self.slope * leg.climb_mps;
-            let left = Vector2::new(
-                tangent(leg.lean_deg) - wanted.x,
-                change_us - (wanted.y - hover.y),
-            );
+            let left =
+                Vector2::new(tangent(leg.lean_deg) - wanted.x, change_us - (wanted.y - hover.y));
             found.push((left, noise(air_mps)));
         }
         found
@@ -392,10 +410,9 @@ mod tests {
         let doubts = DVector::from_row_slice(&doubts);
         let mut other = forms.clone();
         for (doubt, by) in forms.doubts.iter().zip(&doubts) {
-            for (of, more) in [
-                (&mut other.file.lean, &doubt.lean),
-                (&mut other.file.change_us, &doubt.change_us),
-            ] {
+            for (of, more) in
+                [(&mut other.file.lean, &doubt.lean), (&mut other.file.change_us, &doubt.change_us)]
+            {
                 let cells = of.iter_mut().flatten().zip(more.iter().flatten());
                 cells.for_each(|(of, more)| *of += by * more);
             }

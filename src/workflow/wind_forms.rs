@@ -59,10 +59,11 @@ pub(crate) fn wind_forms(ground_amsl_m: f64, vehicle: &Vehicle) -> Option<WindFo
     let doubts = doubted(&vehicle);
     let others: Vec<&Vehicle> = doubts.iter().flat_map(|doubt| &doubt.vehicles).collect();
     let all: Vec<&Vehicle> = std::iter::once(&vehicle).chain(others).collect();
-    let responses: Vec<Option<Response>> =
+    let responses: Vec<Option<(Response, Vec<f64>)>> =
         all.par_iter().map(|vehicle| response(ratio, vehicle)).collect();
     let mut responses = responses.into_iter();
-    let mut file = responses.next()??;
+    let (mut file, calm_us) = responses.next()??;
+    let mut responses = responses.map(|found| Some(found?.0));
     let mut moved = Vec::new();
     for doubt in &doubts {
         let found: Option<Vec<Response>> = responses.by_ref().take(doubt.vehicles.len()).collect();
@@ -89,6 +90,7 @@ pub(crate) fn wind_forms(ground_amsl_m: f64, vehicle: &Vehicle) -> Option<WindFo
         wind_step_mps: WIND_STEP_MPS,
         first_climb_mps: FIRST_CLIMB_MPS,
         climb_step_mps: CLIMB_STEP_MPS,
+        calm_us,
         file,
         doubts,
     })
@@ -153,10 +155,10 @@ fn doubted(vehicle: &Vehicle) -> Vec<Doubted> {
     doubts
 }
 
-/// Lean and change of the pulse in all winds that leave the vehicle in balance.
-fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<Response> {
+/// Lean and change of the pulse in all winds that leave the vehicle in balance, and its pulses without wind, us.
+fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<(Response, Vec<f64>)> {
     let mut trim = Trim::of(vehicle).ok()?;
-    let mut found = Response::default();
+    let (mut found, mut calm) = (Response::default(), Vec::new());
     for climb in 0..CLIMBS {
         let climb_mps = FIRST_CLIMB_MPS + climb as f64 * CLIMB_STEP_MPS;
         let mut at = |wind_mps: f64| {
@@ -164,6 +166,7 @@ fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<Response> {
             trim.at(&Condition { velocity_mps, density_ratio, ..Condition::default() })
         };
         let calm_us = at(0.0)?.pulse_us;
+        calm.push(calm_us);
         let (mut leans, mut changes_us) = (vec![0.0], vec![0.0]);
         for step in 1..=(STRONGEST_MPS / WIND_STEP_MPS) as usize {
             let Some(steady) = at(step as f64 * WIND_STEP_MPS) else { break };
@@ -174,7 +177,7 @@ fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<Response> {
         found.lean.push(leans);
         found.change_us.push(changes_us);
     }
-    Some(found)
+    Some((found, calm))
 }
 
 fn cut(response: &mut Response, winds: usize) {
@@ -186,7 +189,8 @@ fn cut(response: &mut Response, winds: usize) {
 fn difference(file: &Response, others: &[Response], weights: &[f64]) -> Response {
     let part = |of: fn(&Response) -> &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
         let cell = |row: usize, column: usize, value: f64| {
-            let off = |(other, weight): (&Response, &f64)| weight * (of(other)[row][column] - value);
+            let off =
+                |(other, weight): (&Response, &f64)| weight * (of(other)[row][column] - value);
             others.iter().zip(weights).map(off).sum()
         };
         let row = |(row, values): (usize, &Vec<f64>)| {
@@ -211,7 +215,8 @@ mod tests {
         assert!((-60.0..-15.0).contains(&forms.file.change_us[hover][eight]));
         for doubt in &forms.doubts {
             assert_eq!((doubt.lean[hover][0], doubt.change_us[hover][0]), (0.0, 0.0), "no wind");
-            let moved = doubt.lean[hover][eight].abs() * 100.0 + doubt.change_us[hover][eight].abs();
+            let moved =
+                doubt.lean[hover][eight].abs() * 100.0 + doubt.change_us[hover][eight].abs();
             assert!(moved > 0.2, "{moved}");
         }
         assert!(wind_forms(190.0, &builtin("airsim-generic-quad").unwrap()).is_none());
