@@ -62,37 +62,36 @@ pub(crate) fn wind_forms(ground_amsl_m: f64, vehicle: &Vehicle) -> Option<WindFo
     let responses: Vec<Option<(Response, Vec<f64>)>> =
         all.par_iter().map(|vehicle| response(ratio, vehicle)).collect();
     let mut responses = responses.into_iter();
-    let (mut file, calm_us) = responses.next()??;
+    let (file, calm_us) = responses.next()??;
     let mut responses = responses.map(|found| Some(found?.0));
     let mut moved = Vec::new();
     for doubt in &doubts {
-        let found: Option<Vec<Response>> = responses.by_ref().take(doubt.vehicles.len()).collect();
-        if let Some(found) = found {
+        let found: Vec<Option<Response>> = responses.by_ref().take(doubt.vehicles.len()).collect();
+        if let Some(found) = found.into_iter().collect::<Option<Vec<Response>>>() {
             moved.push((found, doubt.weights.clone()));
         }
     }
-    // In the strongest winds not every form keeps its balance.
-    let shortest = |response: &Response| response.lean.iter().map(Vec::len).min().unwrap_or(0);
-    let all = std::iter::once(&file).chain(moved.iter().flat_map(|(found, _)| found));
-    let winds = all.map(shortest).min().unwrap_or(0);
-    if (winds as f64) * WIND_STEP_MPS < LEAST_WIND_MPS {
+    let doubts: Vec<Response> =
+        moved.into_iter().map(|(found, weights)| difference(&file, &found, &weights)).collect();
+    // Where the file's vehicle finds no balance, the map has no climb.
+    let flies = |climb: usize| !file.lean[climb].is_empty();
+    let level = (-FIRST_CLIMB_MPS / CLIMB_STEP_MPS).round() as usize;
+    if !flies(level) {
         return None;
     }
-    cut(&mut file, winds);
-    let doubts = moved
-        .into_iter()
-        .map(|(mut found, weights)| {
-            found.iter_mut().for_each(|response| cut(response, winds));
-            difference(&file, &found, &weights)
-        })
-        .collect();
+    let first = (0..=level).rev().take_while(|climb| flies(*climb)).last().unwrap_or(level);
+    let end = (level..CLIMBS).take_while(|climb| flies(*climb)).last().unwrap_or(level) + 1;
+    let kept = |response: Response| Response {
+        lean: response.lean[first..end].to_vec(),
+        change_us: response.change_us[first..end].to_vec(),
+    };
     Some(WindForms {
         wind_step_mps: WIND_STEP_MPS,
-        first_climb_mps: FIRST_CLIMB_MPS,
+        first_climb_mps: FIRST_CLIMB_MPS + first as f64 * CLIMB_STEP_MPS,
         climb_step_mps: CLIMB_STEP_MPS,
-        calm_us,
-        file,
-        doubts,
+        calm_us: calm_us[first..end].to_vec(),
+        file: kept(file),
+        doubts: doubts.into_iter().map(kept).collect(),
     })
 }
 
@@ -155,7 +154,8 @@ fn doubted(vehicle: &Vehicle) -> Vec<Doubted> {
     doubts
 }
 
-/// Lean and change of the pulse in all winds that leave the vehicle in balance, and its pulses without wind, us.
+/// Lean and change of the pulse in all winds, and the pulses without wind, us, by climb. Climbs without balance in calm
+/// air or in [`LEAST_WIND_MPS`] are empty.
 fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<(Response, Vec<f64>)> {
     let mut trim = Trim::of(vehicle).ok()?;
     let (mut found, mut calm) = (Response::default(), Vec::new());
@@ -165,24 +165,40 @@ fn response(density_ratio: f64, vehicle: &Vehicle) -> Option<(Response, Vec<f64>
             let velocity_mps = Vector3::new(wind_mps, 0.0, climb_mps);
             trim.at(&Condition { velocity_mps, density_ratio, ..Condition::default() })
         };
-        let calm_us = at(0.0)?.pulse_us;
-        calm.push(calm_us);
-        let (mut leans, mut changes_us) = (vec![0.0], vec![0.0]);
-        for step in 1..=(STRONGEST_MPS / WIND_STEP_MPS) as usize {
-            let Some(steady) = at(step as f64 * WIND_STEP_MPS) else { break };
-            let sine = steady.lean.norm();
-            leans.push(sine / (1.0 - sine * sine).sqrt());
-            changes_us.push(steady.pulse_us - calm_us);
-        }
-        found.lean.push(leans);
-        found.change_us.push(changes_us);
+        let calm_us = at(0.0).map(|steady| steady.pulse_us);
+        let steps = 0..=(STRONGEST_MPS / WIND_STEP_MPS) as usize;
+        let in_winds: Vec<Option<[f64; 2]>> = steps
+            .map(|step| {
+                let steady = at(step as f64 * WIND_STEP_MPS)?;
+                let sine = steady.lean.norm();
+                let tangent = sine / (1.0 - sine * sine).sqrt();
+                Some([if step == 0 { 0.0 } else { tangent }, steady.pulse_us - calm_us?])
+            })
+            .collect();
+        let rows = filled(&in_winds).unwrap_or_default();
+        found.lean.push(rows.iter().map(|[lean, _]| *lean).collect());
+        found.change_us.push(rows.iter().map(|[_, change_us]| *change_us).collect());
+        calm.push(calm_us.unwrap_or_default());
     }
     Some((found, calm))
 }
 
-fn cut(response: &mut Response, winds: usize) {
-    let rows = response.lean.iter_mut().chain(&mut response.change_us);
-    rows.for_each(|row| row.truncate(winds));
+/// A row without holes: between neighbours by a line, behind the last one on from the last two. `None` where too little
+/// is there.
+fn filled(row: &[Option<[f64; 2]>]) -> Option<Vec<[f64; 2]>> {
+    let known: Vec<(usize, [f64; 2])> =
+        row.iter().enumerate().filter_map(|(index, value)| Some((index, (*value)?))).collect();
+    let (first, last) = (known.first()?.0, known.last()?.0);
+    if first > 0 || (last as f64) * WIND_STEP_MPS < LEAST_WIND_MPS || known.len() < 2 {
+        return None;
+    }
+    let at = |index: usize| {
+        let above = known.partition_point(|(place, _)| *place < index).clamp(1, known.len() - 1);
+        let ((low, from), (high, to)) = (known[above - 1], known[above]);
+        let share = (index as f64 - low as f64) / (high as f64 - low as f64);
+        std::array::from_fn(|part| from[part] + (to[part] - from[part]) * share)
+    };
+    Some((0..row.len()).map(at).collect())
 }
 
 /// What a weighed sum of other responses adds to one.
