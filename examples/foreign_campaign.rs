@@ -1,32 +1,37 @@
-//! Flies a campaign (the paper's ladder, and a hover) in a foreign world with air of a known kind, and writes the true
-//! air beside it: what maps are held against.
+//! Flies a campaign (the paper's ladder, and a hover or a scan) in a foreign world with air of a known kind, and writes
+//! the true air beside it: what maps are held against.
 //!
 //! ```text
 //! cargo run --release --example foreign_campaign -- gusty 7 FOLDER
 //! updraft analyze FOLDER
 //! ```
 //!
-//! More arguments set values of the campaign's templates: `'calibration.legs.speeds_mps=[3, 6]'`.
-//!
-//! The kind is `still`, `field`, `gusty`, `advected` or `wind-change`. `truth.csv` has the mean of the true vertical air
-//! speed over the 10 s around each second of the hover.
+//! The kind is `still`, `field`, `gusty`, `advected`, `wind-change`, `thermal` or `drifting-thermal`; after `scan-` the
+//! fleet flies `scan-campaign`. `truth.csv` has the mean of the true vertical air speed over the 10 s around each second,
+//! along the planned way; `truth-thermal.json` the thermal. A fourth argument is the side of the grid (5), a fifth the
+//! distance of its drones (10 m). Arguments with an equals sign, wherever behind the folder, set values of the campaign's
+//! templates: `'calibration.legs.speeds_mps=[3, 6]'`.
 
 #![expect(clippy::print_stderr, reason = "it says what went wrong")]
 
 use std::error::Error;
+use std::f64::consts::SQRT_2;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use foreign_worlds::World;
-use foreign_worlds::air::{Air, AirSettings, FieldSettings, Shear};
+use foreign_worlds::air::{AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
 use foreign_worlds::hidden::HiddenEffect;
+use updraft::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
-use updraft::blind::worlds::fly::{Settings, fly_plan};
+use updraft::blind::worlds::fly::{Settings, air_of, fly_plan};
 use updraft::blind::worlds::{Worlds, draw};
 use updraft::campaign;
 use updraft::mission::Plan;
 use updraft::mission::plan::SegmentKind;
 use updraft::mission::resolve::Override;
+use updraft::show::quantise::as_flown;
+use updraft::show::trajectory::Cursor;
 use updraft::workflow::host::Quiet;
 use updraft::workflow::{mission, plan};
 
@@ -40,20 +45,32 @@ const STEPS: usize = 5;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let (Some(kind), Some(seed), Some(folder)) = (words.next(), words.next(), words.next()) else {
-        eprintln!("usage: foreign_campaign still|field|gusty|advected|wind-change SEED FOLDER");
+        eprintln!(
+            "usage: foreign_campaign [scan-]KIND SEED FOLDER [SIDE] [SPACING] [KEY=VALUE...]"
+        );
         return Ok(());
     };
+    let (more, numbers): (Vec<String>, Vec<String>) = words.partition(|word| word.contains('='));
+    let mut numbers = numbers.into_iter();
+    let side = numbers.next().map_or(Ok(5), |word| word.parse::<u32>())?;
+    let spacing_m = numbers.next().map_or(Ok(10.0), |word| word.parse::<f64>())?;
     let (seed, root) = (seed.parse::<u64>()?, PathBuf::from(folder));
-    let more: Result<Vec<Override>, _> = words.map(|word| Override::parse(&word)).collect();
+    let (template, kind) = kind
+        .strip_prefix("scan-")
+        .map_or(("campaign", kind.as_str()), |kind| ("scan-campaign", kind));
     let mut overrides = vec![
-        Override::new("grid.rows", 5),
-        Override::new("grid.columns", 5),
-        Override::new("grid.spacing_m", 10.0),
-        Override::new("duration_s", 300.0),
+        Override::new("grid.rows", i64::from(side)),
+        Override::new("grid.columns", i64::from(side)),
+        Override::new("grid.spacing_m", spacing_m),
         Override::new("vehicle", "pixel"),
     ];
-    overrides.extend(more?);
-    let planned = mission::resolve("campaign", &overrides)?;
+    if template == "campaign" {
+        overrides.push(Override::new("duration_s", 300.0));
+    }
+    for word in &more {
+        overrides.push(Override::parse(word)?);
+    }
+    let planned = mission::resolve(template, &overrides)?;
     let host = Quiet::default();
     plan::write(&host, &planned, &plan::shows(&planned), &root, false)?;
     let cell = Cell {
@@ -67,10 +84,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     // Pulses follow the battery's voltage, as those of all controllers do that do not measure it.
     let voltage = HiddenEffect { kind: "voltage".to_owned(), values: vec![1.0] };
-    let drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
+    let mut drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
+    if !kind.starts_with("noisy") {
+        // Noise of pulses that lasts for seconds cannot be told from gusts of a drone's own: only one kind has it.
+        drawn.noise.pulse_coloured_us = 0.0;
+    }
     for (index, flight) in campaign::flights(&root)?.iter().enumerate() {
         let plan = flight.read_plan()?;
-        let air = air(&kind, index).ok_or("this kind of air is not known")?;
+        let mut air = air(kind, index).ok_or("this kind of air is not known")?;
+        if index == 1 && kind.ends_with("thermal") {
+            let thermal = thermal(&plan, seed, air.wind_mps);
+            air.thermal = Some(thermal);
+            std::fs::write(
+                root.join("truth-thermal.json"),
+                serde_json::to_string_pretty(&thermal)?,
+            )?;
+        }
         let world = World { air, ..drawn.clone() };
         let air_seed = seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
         let missing = missing(&plan, air_seed);
@@ -79,7 +108,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             Settings { world: &world, air_seed, charges: &[], missing: &missing, stop: None };
         fly_plan(&plan, &settings, flight)?;
         if index == 1 {
-            std::fs::write(root.join("truth.csv"), truth(&plan, &world, air_seed))?;
+            std::fs::write(root.join("truth.csv"), truth(&plan, &world, air_seed)?)?;
+            let scales = serde_json::to_string_pretty(&scales(&world.air))?;
+            std::fs::write(root.join("truth-air.json"), scales)?;
         }
     }
     Ok(())
@@ -97,6 +128,7 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
         own_mps: 0.0,
         own_s: 4.0,
         field: None,
+        thermal: None,
         wind_mps: [0.0; 2],
         shear: Shear::None,
         gust_share: 0.1,
@@ -108,6 +140,7 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
         "still" => still,
         "field" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "gusty" => AirSettings { field: field(0.5, 145.0, 186.0, false), own_mps: 0.25, ..still },
+        "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }
@@ -116,8 +149,68 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
             wind_mps: [if flight == 0 { 1.0 } else { 8.0 }, 0.0],
             ..still
         },
+        // Alone in the hover; the calibration is flown in the field.
+        "thermal" => AirSettings { field: field(0.15, 60.0, 60.0, false), own_mps: 0.15, ..still },
+        "drifting-thermal" => AirSettings {
+            field: field(0.15, 60.0, 60.0, true),
+            own_mps: 0.15,
+            wind_mps: [0.8, 0.3],
+            ..still
+        },
         _ => return None,
     })
+}
+
+/// A thermal that the fleet meets: its core is within the tracks, in the middle of the flight if it drifts.
+fn thermal(plan: &Plan, seed: u64, drift_mps: [f64; 2]) -> ThermalSettings {
+    let draw = |salt: u64, [low, high]: [f64; 2]| {
+        let share = mixed(seed.wrapping_mul(31) ^ (salt << 50)) as f64 / u64::MAX as f64;
+        low + share * (high - low)
+    };
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for slot in &plan.slots {
+        for segment in plan.segments(slot) {
+            for axis in 0..2 {
+                let at_m = slot.home_m[axis] + segment.to_m[axis];
+                low[axis] = low[axis].min(at_m);
+                high[axis] = high[axis].max(at_m);
+            }
+        }
+    }
+    let middle_s = plan.duration_ms as f64 / 2000.0;
+    let core_m = [0, 1]
+        .map(|axis| draw(1 + axis as u64, [low[axis], high[axis]]) - drift_mps[axis] * middle_s);
+    let profile = match seed % 3 {
+        0 => Profile::Gaussian,
+        1 => Profile::Ring,
+        _ => Profile::Flat,
+    };
+    let (radius_m, peak_mps) = (draw(3, [12.0, 30.0]), draw(4, [0.8, 2.5]));
+    ThermalSettings { profile, core_m, radius_m, peak_mps, drift_mps }
+}
+
+/// The true scales; a foreign field's are those of its correlation's fall to exp(-1/2).
+fn scales(air: &AirSettings) -> TrueAir {
+    let field = air.field.as_ref().map(|field| {
+        let drift_mps = if field.is_advected { air.wind_mps } else { [0.0; 2] };
+        TrueField {
+            sd_mps: field.sd_mps,
+            lambda_m: SQRT_2 * field.length_m,
+            lambda_y_m: SQRT_2 * field.length_m,
+            tau_s: SQRT_2 * field.time_s,
+            wind_mps: drift_mps[0].hypot(drift_mps[1]),
+            is_gaussian: true,
+            drift_mps: Some(drift_mps),
+        }
+    });
+    let gusts = TrueGusts {
+        spectrum: "first order".to_owned(),
+        sd_mps: air.own_mps,
+        length_m: 0.0,
+        time_s: Some(air.own_s),
+    };
+    TrueAir { field, gusts: if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() } }
 }
 
 /// Slots whose log is lost.
@@ -137,21 +230,28 @@ fn mixed(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The true air of the hover as a table.
-fn truth(plan: &Plan, world: &World, air_seed: u64) -> String {
+/// The true air along the planned ways, from the beginning of the first hover to the end of the last hover or leg, as
+/// a table.
+fn truth(plan: &Plan, world: &World, air_seed: u64) -> Result<String, Box<dyn Error>> {
     let mut text = "slot,time_s,w10_mps\n".to_owned();
-    let end_s = plan.duration_ms as f64 / 1000.0;
-    let air = Air::new(&world.air, [-30.0, end_s + 90.0], air_seed);
-    for slot in &plan.slots {
-        let hover = plan.segments(slot).iter().filter(|segment| segment.kind == SegmentKind::Hover);
-        let Some(hover) = hover.max_by_key(|segment| segment.end_ms - segment.start_ms) else {
-            continue;
-        };
-        let (start, end) = (hover.start_ms as usize / 1000, hover.end_ms as usize / 1000);
-        let place_m = [slot.home_m[0], slot.home_m[1], hover.from_m[2]];
+    let air = air_of(plan, &world.air, air_seed)?;
+    let show = plan.to_show();
+    for (slot, drone) in plan.slots.iter().zip(&show.drones) {
+        let measures = |kind| matches!(kind, SegmentKind::Hover | SegmentKind::Horizontal);
+        let mut measured =
+            plan.segments(slot).iter().filter(|segment| measures(segment.kind)).peekable();
+        let Some(start_ms) = measured.peek().map(|segment| segment.start_ms) else { continue };
+        let end_ms = measured.map(|segment| segment.end_ms).max().unwrap_or(start_ms);
+        let (start, end) = (start_ms as usize / 1000, end_ms as usize / 1000);
+        let flown = as_flown(drone)?;
+        let mut cursor = Cursor::new(&flown.trajectory);
         let mut around = air.around(slot.slot);
         let seconds: Vec<f64> = (start * STEPS..end * STEPS)
-            .map(|step| around.velocity_mps(place_m, (step as f64 + 0.5) / STEPS as f64)[2])
+            .map(|step| {
+                let time_s = (step as f64 + 0.5) / STEPS as f64;
+                let place_m = cursor.state_at(time_s).position_m.into();
+                around.velocity_mps(place_m, time_s)[2]
+            })
             .collect();
         for middle in start + MEAN_S / 2..=end.saturating_sub(MEAN_S / 2) {
             let from = (middle - MEAN_S / 2 - start) * STEPS;
@@ -160,5 +260,5 @@ fn truth(plan: &Plan, world: &World, air_seed: u64) -> String {
             let _ = writeln!(text, "{},{middle},{mean:.4}", slot.slot);
         }
     }
-    text
+    Ok(text)
 }

@@ -107,6 +107,7 @@ mod tests {
             clock: Clock::default(),
             windows: Vec::new(),
             laws: None,
+            line: None,
             offset: None,
             partial_ladder: None,
             trace: Trace::default(),

@@ -13,10 +13,13 @@ use super::caution::{fit_cautions, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
+use super::headline;
+use super::hold::Holding;
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
-use super::law::{LawKind, LawOf};
+use super::law::{LawKind, LawOf, Symbol};
+use super::levelled;
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
@@ -26,7 +29,7 @@ use super::refer::refer_calibration;
 use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
+    LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
@@ -192,25 +195,25 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
-    let lean_table = input.wind_forms.map(|forms| {
+    let by_forms = input.wind_forms.map(|forms| {
         let legs = reference.and_then(|reference| reference.wind_legs.as_ref());
         forms.table(&believed(forms, legs, reference))
     });
     let corrections = Corrections {
         density: input.density,
         leaning: input.leaning,
-        lean_table: lean_table.as_ref(),
+        lean_table: by_forms.as_ref().or(input.lean_table),
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
     };
     let aware = reference
-        .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
+        .filter(|_| input.level.is_none())
+        .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
         .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
     let map_law = options
         .map_law
         .or_else(|| aware.as_ref().map(Aware::law))
         .or_else(|| map_reference.map(better_law));
-    let lean_table = lean_table.as_ref();
     let shared = Shared {
         input,
         options,
@@ -218,8 +221,8 @@ pub fn analyze_flight(
         map_reference,
         planned_purpose,
         map_law,
+        corrections,
         aware,
-        lean_table,
     };
 
     let done = AtomicUsize::new(0);
@@ -250,7 +253,11 @@ pub fn analyze_flight(
         account.ones.sort_by_key(|one| one.drone.slot);
     }
     let contradictions = warnings.into_iter().map(Warning::WhoseLogs).collect();
-    Ok(finish(&shared, account, contradictions))
+    let mut flight = finish(&shared, account, contradictions);
+    if flight.purpose == Purpose::Calibration && !options.plain {
+        headline::add(&mut flight, corrections, input.sag);
+    }
+    Ok(flight)
 }
 
 /// What is believed of drag and lift after the horizontal legs, if any were flown.
@@ -287,7 +294,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         Purpose::Calibration => fleet_laws(shared, &mut drones, &mut warnings),
         Purpose::Measurement => FleetLaws::default(),
     };
-    if purpose == Purpose::Measurement && shared.reference.is_none() {
+    if purpose == Purpose::Measurement && shared.reference.is_none() && input.level.is_none() {
         warnings.push(Warning::NoCalibration);
         let most = climbed.iter().copied().max_by_key(|(up, down)| up + down);
         let most = most.filter(|_| shared.planned_purpose.is_none());
@@ -316,6 +323,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         missing: account::missing(input, &drones, &unused),
         drones,
         flock: laws.flock,
+        headline: None,
         table: laws.table,
         map,
         statistics,
@@ -404,9 +412,11 @@ fn fleet_laws(
             None
         }
     };
+    let flock = hold(shared, drones, flock);
+    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let paper = paper_table(shared, drones);
     let laws: Vec<&Laws> = whole().filter_map(|drone| drone.laws.as_ref()).collect();
-    let mut table = table::table(&laws, paper, &options.fit);
+    let mut table = table::table(&laws, paper, &options.fit, options.plain);
     if let Some(laws) = &flock {
         let vertex = vertex_mps(laws, drones, input.true_updraft_mps).is_some();
         compare_what_fits(&mut table, laws, vertex);
@@ -414,6 +424,31 @@ fn fleet_laws(
     warnings.extend(fit_cautions(flock.as_ref(), drones, input.leaning, input.true_updraft_mps));
     warnings.extend(tilt_caution(drones, options));
     FleetLaws { flock, table, paper }
+}
+
+/// Writes the updraft with the curve of the calibration held, if there is one, into the laws of drones and flock.
+fn hold(shared: &Shared<'_>, drones: &mut [DroneAnalysis], flock: Option<Laws>) -> Option<Laws> {
+    let Some(holding) = (!shared.options.plain).then(|| holding(shared)).flatten() else {
+        return flock;
+    };
+    drones.par_iter_mut().for_each(|drone| {
+        if let Some(laws) = &mut drone.laws {
+            laws.held = holding.of_drone(&drone.windows, drone.slot, &drone.name);
+        }
+    });
+    flock.map(|laws| Laws { held: holding.of_fleet(drones), ..laws })
+}
+
+/// The calibration whose own curve is held.
+fn holding<'a>(shared: &Shared<'a>) -> Option<Holding<'a>> {
+    let reference = shared.reference?;
+    let Shared { input, map_reference, corrections, .. } = shared;
+    let preferred = Aware::new(reference, *corrections, input.sag, None)?;
+    // Only the signed quadratic tells the air that it was calibrated in.
+    let square = map_reference.and_then(|found| found.flock.as_ref()?.signed_quadratic.as_ref());
+    let square = square.filter(|_| preferred.law() == LawKind::SignedQuadratic);
+    let origin = square.and_then(|fit| fit.parameter(Symbol::W)).map(|w| w.estimate);
+    Holding::new(reference, *corrections, input.sag, origin)
 }
 
 /// Marks the drones of a calibration with clearly less of the ladder than the fleet, and warns of them.
@@ -446,7 +481,8 @@ fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
     let calibration = shared.reference.filter(|_| shared.aware.is_some());
     let battery = calibration.filter(|_| shared.input.sag.is_some());
     warnings.extend(battery.and_then(|found| battery_caution(map, found)));
-    warnings.extend(shared.aware.is_none().then_some(Warning::PlainMap));
+    let is_plain = shared.aware.is_none() && shared.input.level.is_none();
+    warnings.extend(is_plain.then_some(Warning::PlainMap));
     warnings.extend(map.is_scan().then_some(Warning::Scan));
     warnings
 }
@@ -458,7 +494,7 @@ fn statistics(
     seen: &[HoverSeen],
 ) -> Option<FieldStatistics> {
     let Shared { input, options, .. } = shared;
-    let drag = match (input.leaning, shared.lean_table) {
+    let drag = match (input.leaning, shared.corrections.lean_table) {
         (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
         (None, Some(table)) => LeanDrag::Table(table),
         (None, None) => LeanDrag::Unknown,
@@ -523,7 +559,10 @@ fn track_of(
 }
 
 /// Why the map's law was taken.
-fn law_reason(shared: &Shared<'_>) -> Option<String> {
+fn law_reason(shared: &Shared<'_>, levelled: Option<&LevelledMap>) -> Option<String> {
+    if let Some(levelled) = levelled {
+        return Some(levelled.words());
+    }
     if shared.options.map_law.is_some() {
         return Some(ASKED_FOR.to_owned());
     }
@@ -544,6 +583,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         (None, Some(own)) => own.at(&times),
         (None, None) => shared.input.truth?.get(&slot?)?.at(&times),
     };
+    let own_truth: Vec<Option<TruthSeries>> =
+        updrafts.iter().map(|named| named.5.clone()).collect();
+    let levelled = levelled::of_map(&series.iter().collect::<Vec<_>>(), &own_truth);
     let measured: Vec<&Measured> =
         series.iter().filter_map(|series| series.measured.as_ref()).collect();
     let aware = shared.aware.as_ref().filter(|_| !measured.is_empty());
@@ -585,8 +627,12 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         .collect();
     let map = UpdraftMap {
         law: shared.map_law.unwrap_or(LawKind::Linear),
-        law_reason: law_reason(shared),
-        wind: match (shared.input.leaning, shared.lean_table) {
+        law_reason: law_reason(shared, levelled.as_ref()),
+        wind: match (shared.input.leaning, shared.corrections.lean_table) {
+            _ if shared.input.level.is_some() => {
+                let response = shared.input.level.and_then(|level| level.response.as_ref());
+                response.map(|_| WindCorrection::Physics)
+            }
             (Some(_), _) => Some(WindCorrection::Drag),
             (None, table) => {
                 table.filter(|_| shared.aware.is_some()).map(|_| WindCorrection::Physics)
@@ -600,8 +646,11 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         calibration_air: aware.map(|aware| aware.zero.air),
         common: aware.map(|aware| aware.common(&measured)),
         truth: truth::check(&drones),
+        levelled,
+        combined: None,
         drones,
         posterior: None,
+        thermals: Vec::new(),
     };
     (map, modelled)
 }

@@ -479,6 +479,7 @@ fn point(
         drone,
         key,
         time_s: f64::midpoint(window.start_s, window.end_s),
+        span_s: window.end_s - window.start_s,
         height_m: window.height_m,
         velocity_mps: referred.velocity_mps,
         pulse_us: referred.pulse_us,

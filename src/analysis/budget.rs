@@ -174,4 +174,11 @@ pub struct TruthCheck {
     pub inside_share: f64,
     /// Share of the drones whose true mean is inside of the interval of their mean.
     pub means_inside_share: f64,
+    /// Root mean square error of the best linear estimate with the true covariances of the air and of all errors, m/s
+    /// (at one second in ten); absent: these are not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit_rms_mps: Option<f64>,
+    /// That of this map at the same places and seconds, m/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_limit_rms_mps: Option<f64>,
 }

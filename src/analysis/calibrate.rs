@@ -217,6 +217,7 @@ fn fit_points(
         signed_quadratic_held: held.map(in_units),
         linear: linear.ok().map(|fit| in_units(untuned(fit, law::linear(measured, scale)))),
         sigma_added_us,
+        held: None,
     })
 }
 

@@ -133,6 +133,17 @@ pub enum Cause {
     },
     /// The log has gaps that cover the whole hover.
     Gaps,
+    /// The stretch that sets the zero is not within the hover.
+    ZeroOutside {
+        /// Start and end of the stretch, show time, s.
+        zero_s: [f64; 2],
+        /// Start and end of the hover, show time, s.
+        hover_s: [f64; 2],
+    },
+    /// Neither a vehicle nor a calibration says how the effort answers the air.
+    NoResponse,
+    /// Neither a stretch of the hover nor a calibration gives the level.
+    NoLevel,
     /// A reason as it was read from a file.
     Said(String),
 }
@@ -240,6 +251,20 @@ impl Cause {
                 format!("the {}'s pulses are outside of the law's range", way(*track)).into()
             }
             Self::Gaps => "the hover has no 10 s without a gap in the log".into(),
+            Self::ZeroOutside { zero_s: [from, to], hover_s: [first, last] } => format!(
+                "the stretch {from:.0} to {to:.0} s that sets the zero has no 10 s of this hover, or is \
+                 not within it: it lasts from {first:.0} to {last:.0} s of the table; give a stretch of \
+                 it (--zero {first:.0}..{:.0}s)",
+                f64::midpoint(*first, *last)
+            )
+            .into(),
+            Self::NoResponse => "nothing says how the rotor effort answers the air: give --vehicle, or \
+                                 a calibration flight in the mapping"
+                .into(),
+            Self::NoLevel => "nothing says what the rotor effort is in still air: give the stretch of \
+                              the hover that sets the zero (--zero 0..150s), or a calibration flight in \
+                              the mapping"
+                .into(),
         }
     }
 

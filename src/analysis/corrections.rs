@@ -108,6 +108,11 @@ pub(super) struct Referred {
 }
 
 impl Corrections<'_> {
+    /// Whether the vehicle's drag is known, so that wind is corrected for.
+    pub(super) fn knows_wind(&self) -> bool {
+        self.leaning.is_some() || self.lean_table.is_some()
+    }
+
     /// Standard errors of the doubts (units of [`Referred::doubts_us`]).
     pub(super) fn sigmas(&self, pack: Option<&Pack>) -> [f64; DOUBTS] {
         let mut sigmas = [0.0; DOUBTS];
@@ -116,14 +121,11 @@ impl Corrections<'_> {
         }
         // Both kinds of drift are scaled to us in `refer`.
         sigmas[DRIFT] = if self.warm_up_us.is_some() { 1.0 } else { 0.0 };
-        sigmas[WIND] = match (self.leaning, self.lean_table) {
-            (Some(_), _) => WIND_SHARE,
+        match (self.leaning, self.lean_table) {
+            (Some(_), _) => sigmas[WIND] = WIND_SHARE,
             // The table's own doubts are standard errors.
-            (None, Some(_)) => 1.0,
-            (None, None) => UNKNOWN_WIND_SHARE,
-        };
-        if self.leaning.is_none() && self.lean_table.is_some() {
-            WINDS.iter().for_each(|wind| sigmas[*wind] = 1.0);
+            (None, Some(_)) => WINDS.iter().for_each(|wind| sigmas[*wind] = 1.0),
+            (None, None) => sigmas[WIND] = UNKNOWN_WIND_SHARE,
         }
         sigmas[DENSITY] = match self.density {
             // AirSim's thrust is linear by definition; the weather of the day is not the standard's.

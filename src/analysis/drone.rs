@@ -3,10 +3,11 @@
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
+use super::corrections::Corrections;
 use super::hover::Hover;
 use super::input::{FlightInput, LogInput, TruthSeries};
 use super::law::{LawKind, LawOf};
-use super::lean_table::LeanTable;
+use super::levelled;
 use super::map_statistics::HoverSeen;
 use super::offset::OffsetMap;
 use super::options::AnalysisOptions;
@@ -33,10 +34,9 @@ pub(super) struct Shared<'a> {
     pub(super) map_reference: Option<&'a FlightAnalysis>,
     pub(super) planned_purpose: Option<Purpose>,
     pub(super) map_law: Option<LawKind>,
+    pub(super) corrections: Corrections<'a>,
     /// The calibration with what it tells about errors, for the map.
     pub(super) aware: Option<Aware<'a>>,
-    /// What wind does to the pulse by the lean, where it is known and is all that is.
-    pub(super) lean_table: Option<&'a LeanTable>,
 }
 
 /// What one log gave.
@@ -101,10 +101,15 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
     let seen = Seen { flight: &flight, corrected: &corrected, targets: &targets, windows: &stats };
-    let updraft = shared.map_reference.map(|reference| match &elsewhere {
-        Some(reason) => Err(reason.clone()),
-        None => measure(shared, &seen, reference, number, &name),
-    });
+    let measures = shared.planned_purpose != Some(Purpose::Calibration);
+    let updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
+        (None, None, _) => None,
+        (_, _, Some(reason)) => Some(Err(reason.clone())),
+        (Some(level), ..) => {
+            Some(levelled::measure(shared, level, &flight, &targets, (number, &name)))
+        }
+        (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
+    };
     let source = input.shown(&log.path);
     let drone = DroneAnalysis {
         slot: number,
@@ -115,6 +120,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         windows: stats,
         offset,
         laws: None,
+        line: None,
         partial_ladder: None,
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,

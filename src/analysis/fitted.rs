@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::fit_warning::FitWarning;
+use super::hold::HeldCurve;
 use super::kind::{LawKind, Symbol};
 use crate::base::estimate::Estimate;
 
@@ -22,6 +23,9 @@ pub struct Laws {
     /// `None` when the weights do not ask for it or there are no degrees of freedom.
     #[serde(default)]
     pub sigma_added_us: Option<f64>,
+    /// The updraft with the calibration's own curve held, where a calibration was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldCurve>,
 }
 
 /// A fitted law.
@@ -49,6 +53,10 @@ pub struct Fit {
     pub other_minima: Vec<Vec<f64>>,
     /// What is doubtful about this fit.
     pub warnings: Vec<FitWarning>,
+    /// The edge of the searched range of W where the fit ended, m/s: W lies beyond, and no other parameter of the
+    /// fit means anything. Absent: it ended within.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub w_beyond_mps: Option<f64>,
 }
 
 impl Fit {

@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use super::battery::Sag;
 use super::density::Density;
+use super::lean_table::LeanTable;
+use super::levelled::Level;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
 use super::wind_forms::WindForms;
@@ -61,8 +63,13 @@ pub struct FlightInput<'a> {
     /// Effect of wind on the vehicle's pulse, where its physics is known and
     /// [`FlightInput::leaning`] does not give it.
     pub wind_forms: Option<&'a WindForms>,
+    /// Effect of wind on another indicator than the pulse, where the vehicle is known.
+    pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
+    /// Response of the vehicle whose level the flight gives; `None`: the map is inverted with the
+    /// calibration's laws.
+    pub level: Option<&'a Level>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
@@ -71,9 +78,20 @@ impl FlightInput<'_> {
     /// Without the corrections that are known for pulses alone.
     pub(super) fn for_indicator(&self, indicator: Indicator) -> Self {
         match indicator {
-            Indicator::Pulse => *self,
+            Indicator::Pulse => {
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self { lean_table, ..*self }
+            }
             Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, sag: None, wind_forms: None, ..*self }
+                let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
+                Self {
+                    density: None,
+                    leaning: None,
+                    sag: None,
+                    wind_forms: None,
+                    lean_table,
+                    ..*self
+                }
             }
         }
     }

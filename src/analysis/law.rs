@@ -170,6 +170,9 @@ pub fn signed_quadratic(points: &[LawPoint], scale: ErrorScale) -> Result<Fit, F
     if !fit.other_minima.is_empty() {
         fit.warnings.push(FitWarning::OtherMinima { count: fit.other_minima.len() });
     }
+    if matches!(found.warning, Some(FitWarning::NoMinimum)) {
+        fit.w_beyond_mps = found.best.parameters.get(2).copied();
+    }
     fit.warnings.extend(found.warning);
     Ok(fit)
 }
@@ -209,6 +212,7 @@ pub fn signed_quadratic_held(
         .collect();
     if best.parameters[0].abs() >= W_LIMIT_MPS {
         fit.warnings.push(FitWarning::WAtEdge);
+        fit.w_beyond_mps = Some(W_LIMIT_MPS.copysign(best.parameters[0]));
     }
     Ok(fit)
 }
@@ -427,6 +431,7 @@ fn describe(
         rms_us: (squares / points.len() as f64).sqrt(),
         other_minima: Vec::new(),
         warnings,
+        w_beyond_mps: None,
     }
 }
 

@@ -5,12 +5,15 @@
 //! but the lean is: the table says by how much the pulse differs from that of level flight in air
 //! without wind.
 
+use crate::flight::Indicator;
 /// Directions in which what is doubted about drag and lift moves a table together.
 pub const DIRECTIONS: usize = 2;
 
 /// Change of the pulse by lean and vertical air speed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LeanTable {
+    /// Indicator whose values the changes are of, in its unit where a name says us.
+    pub indicator: Indicator,
     /// Step of the lean from 0 on, degrees.
     pub lean_step_deg: f64,
     /// Lowest vertical air speed, m/s.
@@ -76,6 +79,7 @@ mod tests {
     #[test]
     fn interpolates_inside_and_holds_the_edges() {
         let table = LeanTable {
+            indicator: Indicator::Pulse,
             lean_step_deg: 2.0,
             first_climb_mps: -1.0,
             climb_step_mps: 1.0,

@@ -3,6 +3,7 @@
 use super::result::{Fit, Laws, UpdraftMap};
 use super::running::RUNNING_S;
 use super::statistics::averaging::{Seconds, averaging};
+use super::statistics::baseline::baseline;
 use super::statistics::result::FieldStatistics;
 use super::statistics::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
 use super::statistics::{FieldInput, StatisticsOptions, field_statistics};
@@ -85,7 +86,9 @@ pub(super) fn of_map(
     };
     let mut statistics = field_statistics(&input, options);
     let drones = || map.drones.iter().zip(seen);
-    match map.flock.as_ref().and_then(slope_us_per_mps) {
+    let levelled = map.levelled.as_ref().and_then(|levelled| levelled.drones.first());
+    let of_level = levelled.map(|drone| drone.slope);
+    match of_level.or_else(|| map.flock.as_ref().and_then(slope_us_per_mps)) {
         Some(slope) => {
             let fleet: Vec<Seconds> = drones()
                 .map(|(drone, seen)| Seconds {
@@ -98,6 +101,7 @@ pub(super) fn of_map(
                         .collect(),
                 })
                 .collect();
+            statistics.baseline = baseline(&fleet);
             match averaging(&fleet) {
                 Ok(found) => statistics.averaging = Some(found),
                 Err(reason) => statistics.absent.push(reason),

@@ -23,17 +23,17 @@ pub struct AnalysisOptions {
     /// field, weighted by the samples' standard deviation.
     pub paper_windows: bool,
     /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the line, which may bend,
-    /// unless the calibration's windows make the signed quadratic clearly more probable (without
-    /// [`AnalysisOptions::air_aware`]: the one of lower reduced chi²).
+    /// unless the calibration's windows make the signed quadratic clearly more probable (with
+    /// [`AnalysisOptions::plain`]: the one of lower reduced chi²).
     pub map_law: Option<LawKind>,
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
     /// Options for the statistics of a map.
     pub statistics: StatisticsOptions,
-    /// Whether the map's calibration law knows about slow air and the map has errors with their
-    /// origins; else the laws of the tables are inverted, as in the paper.
-    pub air_aware: bool,
+    /// Whether the estimate is the paper's own: the laws of the tables are inverted second by second, drone by
+    /// drone. Else the map's calibration law knows about slow air, and the map has errors with their origins.
+    pub plain: bool,
     /// Largest number of points of a trace for figures.
     pub trace_points: usize,
 }
@@ -71,7 +71,7 @@ impl Default for AnalysisOptions {
             map_law: None,
             paper: None,
             statistics: StatisticsOptions::default(),
-            air_aware: true,
+            plain: false,
             trace_points: 1200,
         }
     }

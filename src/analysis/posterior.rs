@@ -1,14 +1,18 @@
 //! The posterior map of a flight ([`super::kriging`]) as part of its result.
 
+use super::budget::TruthCheck;
+use super::corrections::{DENSITY, WINDS};
 use super::drone::Shared;
-use super::kriging::{Calibration, Drone, Input, posterior};
+use super::kriging::{Air, Calibration, Drone, Form, Input, best, posterior};
 use super::result::{
-    AirScales, DroneUpdraft, FilledDrone, PosteriorMap, PosteriorScale, UpdraftMap,
+    AirScales, DroneUpdraft, FilledDrone, PosteriorGrid, PosteriorMap, PosteriorScale, UpdraftMap,
 };
-use super::statistics::result::TiltWind;
+use super::statistics::result::{TiltWind, TrueAir};
+use super::thermal::Thermal;
 use super::truth;
 use super::updraft::DroneSeries;
 use crate::base::estimate::Estimate;
+use crate::numeric::mean;
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
@@ -46,12 +50,14 @@ pub(super) fn add(
     wind: Option<&TiltWind>,
 ) {
     let Some(aware) = shared.aware.as_ref() else { return };
-    let (indices, drones): (Vec<usize>, Vec<Drone>) =
+    let (indices, mut drones): (Vec<usize>, Vec<Drone>) =
         seen.into_iter().enumerate().filter_map(|(index, drone)| Some((index, drone?))).unzip();
-    if drones.is_empty() || map.is_scan() {
+    if drones.is_empty() {
         return;
     }
-    let lost = lost(map, shared);
+    share_law(&mut drones);
+    // Where a drone that is lost would have been in a scan, others come by.
+    let lost = if map.is_scan() { Vec::new() } else { lost(map, shared) };
     let height_m = crate::numeric::median(
         drones.iter().filter_map(|drone| Some(drone.place_m.first()?[2])).collect(),
     );
@@ -67,6 +73,7 @@ pub(super) fn add(
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
     let Some(found) = posterior(&input) else { return };
+    let places = indices.clone();
     for (index, series) in indices.into_iter().zip(found.drones) {
         let Some(drone) = map.drones.get_mut(index) else { continue };
         drone.posterior_mps = series.mean_mps;
@@ -87,8 +94,22 @@ pub(super) fn add(
         value: scale.value,
         interval: scale.interval,
     };
+    let first_s = map.time_s.first().copied().unwrap_or_default();
+    map.thermals = found.thermals.iter().map(|one| Thermal::new(one, first_s)).collect();
     let adequate = found.adequacy.is_adequate;
     map.posterior = Some(PosteriorMap {
+        grid: found.grid.map(|grid| PosteriorGrid {
+            time_s: grid
+                .seconds
+                .iter()
+                .filter_map(|second| map.time_s.get(*second).copied())
+                .collect(),
+            x_m: grid.x_m,
+            y_m: grid.y_m,
+            height_m: grid.height_m,
+            updraft_mps: grid.mean_mps,
+            sd_mps: grid.sd_mps,
+        }),
         fleet: found.fleet_mps.map(|(mean, se)| Estimate::new(mean, se)),
         filled,
         scales: adequate.then(|| AirScales {
@@ -103,8 +124,73 @@ pub(super) fn add(
         no_scales: (!adequate).then(|| found.adequacy.sentence()),
         zero_shift_mps: found.zero_shift_mps,
         uniform_probability: found.uniform_probability,
-        truth: truth::check_posterior(&map.drones),
+        truth: truth::check_posterior(&map.drones).map(|check| {
+            let best = known_air(shared).and_then(|air| best(&input, &air));
+            let at_limit = best.and_then(|best| truth::at_limit(&map.drones, &places, &best));
+            TruthCheck {
+                limit_rms_mps: at_limit.map(|[limit, _]| limit),
+                at_limit_rms_mps: at_limit.map(|[_, own]| own),
+                ..check
+            }
+        }),
     });
+}
+
+/// The parts of the air that a flight was simulated in, where the covariances of all are known.
+fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
+    let TrueAir { field, gusts } = shared.input.true_air?;
+    let mut parts = Vec::new();
+    if let Some(field) = field {
+        parts.push(Air {
+            form: if field.is_gaussian { Form::Gaussian } else { Form::Exponential },
+            sd_mps: field.sd_mps,
+            length_m: (field.lambda_m * field.lambda_y_m).sqrt(),
+            stretch: [0.5 * (field.lambda_m / field.lambda_y_m).ln(), 0.0],
+            time_s: field.tau_s,
+            drift_mps: match field.drift_mps {
+                Some(drift_mps) => drift_mps,
+                None if field.wind_mps == 0.0 => [0.0; 2],
+                None => return None,
+            },
+            gust_mps: 0.0,
+            gust_s: 1.0,
+        });
+    }
+    for gust in gusts {
+        let still = Air { gust_mps: gust.sd_mps, gust_s: gust.time_s?, ..STILL };
+        parts.push(still);
+    }
+    (!parts.is_empty()).then_some(parts)
+}
+
+/// Air without a field.
+const STILL: Air = Air {
+    form: Form::Exponential,
+    sd_mps: 0.0,
+    length_m: 1.0,
+    stretch: [0.0; 2],
+    time_s: 1.0,
+    drift_mps: [0.0; 2],
+    gust_mps: 0.0,
+    gust_s: 1.0,
+};
+
+/// Gives all values the fleet's mean of what an error of its law adds to them.
+///
+/// What it adds to one drone's differs by that drone's own slope and mean, which are known with errors. Hundreds of smooth
+/// values would take these for a pattern over the fleet, and tell an updraft that is everywhere the same from an error of
+/// the zero by it, which nothing can.
+fn share_law(drones: &mut [Drone]) {
+    let known = || drones.iter().flat_map(|drone| drone.values.iter().flatten());
+    let law =
+        std::array::from_fn(|index| mean(known().map(|value| value.law[index])).unwrap_or(0.0));
+    let steady: Vec<(usize, f64)> = (WINDS.into_iter().chain([DENSITY]))
+        .map(|doubt| (doubt, mean(known().map(|value| value.doubts_mps[doubt])).unwrap_or(0.0)))
+        .collect();
+    for value in drones.iter_mut().flat_map(|drone| drone.values.iter_mut().flatten()) {
+        value.law = law;
+        steady.iter().for_each(|(doubt, mps)| value.doubts_mps[*doubt] = *mps);
+    }
 }
 
 /// Slots of the plan that the map has not, with their places.

@@ -167,6 +167,7 @@ mod tests {
             signed_quadratic_held: None,
             linear: linear(&points, ErrorScale::Unscaled).ok(),
             sigma_added_us: None,
+            held: None,
         }
     }
 

@@ -8,16 +8,21 @@ pub use super::budget::{
     TruthCheck,
 };
 use super::cause::Cause;
+pub use super::combine::{CombinedDrone, CombinedIndicator, CombinedMap};
 use super::density::Density;
 pub use super::fit_warning::FitWarning;
 pub use super::fitted::{Fit, Laws, Parameter};
+pub use super::headline::{BentLine, Headline};
+pub use super::hold::HeldCurve;
 use super::kind::{LawKind, LawOf};
 pub use super::ladder::{Ladder, PartialLadder};
+pub use super::level::{DroneLevel, HeldOut, HeldOutErrors, LevelledMap};
 use super::offset::OffsetMap;
 use super::statistics::result::FieldStatistics;
 pub use super::stats::SampleStats;
 use super::table::PaperTable;
 pub use super::table::TableRow;
+pub use super::thermal::Thermal;
 use super::warning::Warning;
 use super::wind::Leaning;
 pub use super::wind_legs::{WindLeg, WindLegs};
@@ -74,6 +79,9 @@ pub struct FlightAnalysis {
     pub missing: Vec<Missing>,
     /// Fits to the windows of all drones averaged (the paper's flock mapping), for calibrations.
     pub flock: Option<Laws>,
+    /// The law that the windows prefer, for calibrations; absent: not asked for, or the windows do not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub headline: Option<Headline>,
     /// Statistics over drones of the fitted parameters (Tables I and II).
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
@@ -229,6 +237,9 @@ pub struct DroneAnalysis {
     pub offset: Option<OffsetMap>,
     /// Fitted laws, for calibrations.
     pub laws: Option<Laws>,
+    /// The line that may bend, for calibrations whose windows prefer it ([`FlightAnalysis::headline`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<BentLine>,
     /// Set if the laws rest on clearly less of the ladder than those of the fleet: then they do not
     /// count in [`FlightAnalysis::table`] and [`FlightAnalysis::flock`], and no map uses them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -291,10 +302,19 @@ pub struct UpdraftMap {
     /// Comparison with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+    /// Set where the law is a vehicle's response with its level fitted to the flight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levelled: Option<LevelledMap>,
+    /// The map from several indicators together, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub combined: Option<CombinedMap>,
     /// The map as one estimate of all drones, seconds and the calibration together; absent: too few values, or
     /// drones without places or errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub posterior: Option<PosteriorMap>,
+    /// Thermals: columns of rising air that no stationary field explains, the most certain first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub thermals: Vec<Thermal>,
 }
 
 /// What all values of a flight say together: a uniform updraft, a Gaussian field that may drift with the wind,
@@ -307,6 +327,9 @@ pub struct PosteriorMap {
     /// The air where the plan has a drone and the flight has no values.
     #[serde(default)]
     pub filled: Vec<FilledDrone>,
+    /// The air between the drones, every 10 s; absent: they moved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<PosteriorGrid>,
     /// Scales of the air; absent: no stationary field describes it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scales: Option<AirScales>,
@@ -321,6 +344,23 @@ pub struct PosteriorMap {
     /// Comparison of the posterior with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+}
+
+/// The air on a grid over the fleet: posterior means of the 10 s around a time, with their standard deviations.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PosteriorGrid {
+    /// Show times, s.
+    pub time_s: Vec<f64>,
+    /// Columns in the show frame (x forward), m.
+    pub x_m: Vec<f64>,
+    /// Rows in the show frame (y left), m.
+    pub y_m: Vec<f64>,
+    /// Height above home, m.
+    pub height_m: f64,
+    /// By time, row and column, m/s, up positive; null: nothing is known there.
+    pub updraft_mps: Vec<Vec<Vec<Option<f64>>>>,
+    /// Standard deviations likewise, all origins of error included, m/s.
+    pub sd_mps: Vec<Vec<Vec<Option<f64>>>>,
 }
 
 /// The air at a place of the plan without values.

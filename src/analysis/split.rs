@@ -117,8 +117,11 @@ pub(super) struct WindowPoint {
     pub(super) drone: usize,
     /// What was commanded, and its count among equals: the same for all drones of the fleet.
     pub(super) key: (String, usize),
+    /// Middle of the window, show time, s.
     pub(super) time_s: f64,
-    /// Height above home, m.
+    /// Length of the window, s.
+    pub(super) span_s: f64,
+    /// Mean height above home, m.
     pub(super) height_m: f64,
     pub(super) velocity_mps: f64,
     pub(super) pulse_us: f64,

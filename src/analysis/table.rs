@@ -56,6 +56,9 @@ pub enum TableLaw {
     /// The signed quadratic with A and u0 held at those of a reference.
     #[serde(rename = "signed quadratic, A and u0 held")]
     SignedQuadraticHeld,
+    /// The calibration's own curve, shifted.
+    #[serde(rename = "calibration's curve held")]
+    CurveHeld,
     /// The straight line.
     #[serde(rename = "linear")]
     Linear,
@@ -70,6 +73,7 @@ impl TableLaw {
         match self {
             Self::SignedQuadratic => LawKind::SignedQuadratic.name(),
             Self::SignedQuadraticHeld => "signed quadratic, A and u0 held",
+            Self::CurveHeld => "calibration's curve held",
             Self::Linear => LawKind::Linear.name(),
             Self::Both => "both laws",
         }
@@ -80,7 +84,7 @@ impl TableLaw {
         match self {
             Self::SignedQuadratic | Self::SignedQuadraticHeld => Some(LawKind::SignedQuadratic),
             Self::Linear => Some(LawKind::Linear),
-            Self::Both => None,
+            Self::CurveHeld | Self::Both => None,
         }
     }
 }
@@ -179,7 +183,15 @@ type FitOf = fn(&Laws) -> Option<&Fit>;
 ///
 /// The paper's chi² counts the samples' standard deviation as the error of a window: it is compared
 /// with ours only when the weights are the same ([`Weights::WindowSd`]).
-pub fn table(laws_of: &[&Laws], paper: Option<PaperTable>, options: &FitOptions) -> Vec<TableRow> {
+///
+/// Fits that ended at the edge of the searched range of W are left out, unless `with_edges` (as the paper's
+/// table has them).
+pub fn table(
+    laws_of: &[&Laws],
+    paper: Option<PaperTable>,
+    options: &FitOptions,
+    with_edges: bool,
+) -> Vec<TableRow> {
     let FitOptions { weights, indicator, .. } = *options;
     let laws: [(TableLaw, FitOf); 3] = [
         (TableLaw::SignedQuadratic, |laws| laws.signed_quadratic.as_ref()),
@@ -188,7 +200,8 @@ pub fn table(laws_of: &[&Laws], paper: Option<PaperTable>, options: &FitOptions)
     ];
     let mut rows = Vec::new();
     for (law, fit_of) in laws {
-        let fits: Vec<&Fit> = laws_of.iter().copied().filter_map(fit_of).collect();
+        let within = |fit: &&Fit| with_edges || fit.w_beyond_mps.is_none();
+        let fits: Vec<&Fit> = laws_of.iter().copied().filter_map(fit_of).filter(within).collect();
         let Some(first) = fits.first() else { continue };
         for (index, parameter) in first.parameters.iter().enumerate() {
             if parameter.held {
@@ -208,6 +221,12 @@ pub fn table(laws_of: &[&Laws], paper: Option<PaperTable>, options: &FitOptions)
             let other = row.paper.is_some() && weights != Weights::WindowSd;
             rows.push(TableRow { not_compared: other.then(|| OTHER_CHI2.to_owned()), ..row });
         }
+    }
+    let held = || laws_of.iter().filter_map(|laws| laws.held.as_ref()?.updraft);
+    if held().next().is_some() {
+        let (values, errors): (Vec<f64>, Vec<f64>) = held().map(|w| (w.value, w.se)).unzip();
+        let (quantity, unit) = (Quantity::Parameter(Symbol::W), Symbol::W.unit(indicator));
+        rows.push(row(TableLaw::CurveHeld, quantity, &unit, &values, &errors, paper));
     }
     let added: Vec<f64> = laws_of.iter().filter_map(|laws| laws.sigma_added_us).collect();
     if !added.is_empty() {

@@ -119,6 +119,7 @@ pub(super) fn series(
         height_m: mean(good().map(|second| second.height_m).collect()),
         measured: Some(measured),
         moved_m,
+        levelled: None,
     }
 }
 

@@ -1,8 +1,10 @@
 //! Comparison of a map with the true air.
 
 use super::budget::TruthCheck;
+use super::kriging::Best;
 use super::posterior::half_mps;
 use super::result::DroneUpdraft;
+use crate::numeric::rms;
 
 /// Compares the posterior with the truth; `None` where either is not known.
 pub(super) fn check_posterior(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
@@ -23,6 +25,21 @@ pub(super) fn check_posterior(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
         }
     };
     check(&drones.iter().map(posterior).collect::<Vec<_>>())
+}
+
+/// Root mean square errors of the best linear estimate and of the posterior at the same places and seconds, m/s;
+/// `drones` are places in the map by the index that the estimate gives them.
+pub(super) fn at_limit(map: &[DroneUpdraft], drones: &[usize], best: &[Best]) -> Option<[f64; 2]> {
+    let (mut limit, mut own) = (Vec::new(), Vec::new());
+    for one in best {
+        let Some(drone) = drones.get(one.drone).and_then(|index| map.get(*index)) else { continue };
+        let truth = drone.truth_mps.as_ref().and_then(|truth| truth.get(one.second));
+        let found = drone.posterior_mps.get(one.second).copied().flatten();
+        let Some((truth, found)) = truth.zip(found) else { continue };
+        limit.push(one.updraft_mps - truth);
+        own.push(found - truth);
+    }
+    Some([rms(limit)?, rms(own)?])
 }
 
 /// Compares estimates with the truth; `None` where the truth is not known.

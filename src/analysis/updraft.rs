@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::fitted::Fit;
 use super::law::Law;
+use super::levelled::Levelled;
 use super::measured::Measured;
 use super::running::{RUNNING_S, Running};
 use super::stats::{block_error, mean_sd};
@@ -44,6 +45,8 @@ pub struct DroneSeries {
     /// Where a drone that moved was at each second: north and east of its home and above it, m;
     /// empty for a hover.
     pub(super) moved_m: Vec<Option<[f64; 3]>>,
+    /// What a vehicle's response with a fitted level left for the comparison with the truth.
+    pub(super) levelled: Option<Box<Levelled>>,
 }
 
 /// Lean of a drone, with its effect on the drone's estimate.
@@ -130,6 +133,7 @@ pub fn estimate(
         height_m: mean_sd(flight.height_m.between(hover.start_s, hover.end_s)).0,
         measured: None,
         moved_m: Vec::new(),
+        levelled: None,
     })
 }
 
@@ -150,6 +154,7 @@ pub(super) fn with_errors(
         height_m: mean(&flight.height_m),
         measured: Some(measured),
         moved_m: Vec::new(),
+        levelled: None,
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt::{self, Write as _};
 
 use super::calibrate::CalibrationError;
 use super::cause::{Cause, later};
+use super::fit_warning::W_LIMIT_MPS;
 use super::ladder::{FEWEST_RUNGS, Ladder, PartialLadder};
 use super::windows::Tilt;
 use crate::base::said::said_in_files;
@@ -275,7 +276,8 @@ fn misfit(
     let Some(w) = strong_w_mps else { return Ok(()) };
     write!(
         f,
-        " Its W* of {w:+.2} m/s is the flank of a parabola that stands in for the line, not moving air."
+        " Its W* {} is the flank of a parabola that stands in for the line, not moving air.",
+        w_words(w)
     )
 }
 
@@ -283,10 +285,20 @@ fn vertex(f: &mut fmt::Formatter<'_>, w: f64, [low, high]: [f64; 2]) -> fmt::Res
     let place = if (low..=high).contains(&w) { "at the edge of" } else { "outside of" };
     write!(
         f,
-        "The signed quadratic's W* of {w:+.2} m/s is the vertex of a parabola and no air speed: it lies \
+        "The signed quadratic's W* {} is the vertex of a parabola and no air speed: it lies \
          {place} the ladder's {low:+.1} to {high:+.1} m/s, so that the windows are on one flank, which \
-         stands in for a line that bends. A, u0 and W* describe that bend alone"
+         stands in for a line that bends. A, u0 and W* describe that bend alone",
+        w_words(w)
     )
+}
+
+/// A fitted W as what it is: at the edge of the searched range it is only known to lie beyond.
+fn w_words(w_mps: f64) -> String {
+    match w_mps {
+        w if w <= -W_LIMIT_MPS => format!("below {:+.0} m/s", -W_LIMIT_MPS),
+        w if w >= W_LIMIT_MPS => format!("above {W_LIMIT_MPS:+.0} m/s"),
+        w => format!("of {w:+.2} m/s"),
+    }
 }
 
 fn tilt_form(

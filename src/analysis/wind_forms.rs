@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::lean_table::{DIRECTIONS, LeanTable};
+use crate::flight::Indicator;
 
 /// Leans of a table: up to 30 degrees, in which vehicles with much drag hold their place in 8 m/s.
 const LEANS: usize = 61;
@@ -185,6 +186,7 @@ impl WindForms {
         };
         let usual_climbs: Vec<usize> = (0..climbs).filter(|climb| is_usual(*climb)).collect();
         LeanTable {
+            indicator: Indicator::Pulse,
             lean_step_deg: LEAN_STEP_DEG,
             first_climb_mps: self.first_climb_mps,
             climb_step_mps: self.climb_step_mps,

@@ -51,8 +51,14 @@ pub(super) struct DroneLaw {
 /// Where and when an average over drones was flown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CellAt {
+    /// Middle, show time, s.
     pub(super) time_s: f64,
+    /// Length, s.
+    pub(super) span_s: f64,
+    /// Mean height above home, m.
     pub(super) height_m: f64,
+    /// Vertical velocity, m/s, up positive.
+    pub(super) climb_mps: f64,
     /// Drones in it.
     pub(super) drones: usize,
 }
@@ -205,11 +211,17 @@ impl<'a> Fleet<'a> {
         let interval = |value: fn(&Air) -> f64| {
             [0.025, 0.975].map(|share| quantile(&weighed, share, |one| value(&one.air)))
         };
-        let cell_at = |cell: &Cell| CellAt {
-            time_s: cell.time_s,
-            height_m: mean(cell.members.iter().map(|point| points[*point].height_m))
-                .unwrap_or_default(),
-            drones: cell.members.len(),
+        let cell_at = |cell: &Cell| {
+            let average = |of: fn(&WindowPoint) -> f64| {
+                mean(cell.members.iter().map(|point| of(&points[*point]))).unwrap_or_default()
+            };
+            CellAt {
+                time_s: cell.time_s,
+                span_s: average(|point| point.span_s),
+                height_m: average(|point| point.height_m),
+                climb_mps: average(|point| point.velocity_mps),
+                drones: cell.members.len(),
+            }
         };
         let cells = split.cells.iter().map(cell_at).collect();
         let windows = Windows { record: fleet, cells, parameters: parameters.as_slice().to_vec() };

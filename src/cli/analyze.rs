@@ -9,6 +9,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::origin::OriginChoice;
 use super::words;
+use super::zero::ZeroStretch;
 use crate::analysis::result::Analysis;
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
@@ -19,7 +20,8 @@ use crate::workflow::analyze::{
     Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
 };
 use crate::workflow::clock::Stopwatch;
-use crate::workflow::find::Work;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::find::{LevelWish, Work};
 
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
@@ -31,6 +33,7 @@ const WIDTH: usize = 100;
   updraft analyze logs/ --plan my-campaign/calibration
   updraft analyze flight.BIN
   updraft analyze windy --hold still/analysis.json
+  updraft analyze --csv phantom4-mast.toml --zero 0..150s --vehicle phantom4
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found from
 the desired velocity in the log. A log is assigned to its drone by its home position, else by its
@@ -45,10 +48,19 @@ pub(super) struct AnalyzeArgs {
     /// Analyse tables: a mapping file says what each column is (docs/csv.md)
     #[arg(long, value_name = "MAPPING.toml", conflicts_with_all = ["paths", "plan", "start", "indicator"])]
     csv: Option<PathBuf>,
+    /// Vehicle whose response to climb and wind the tables are inverted with (a built-in name or a
+    /// file); its level is fitted to --zero, or to the mapping's calibration
+    #[arg(long, value_name = "NAME")]
+    vehicle: Option<String>,
+    /// Stretch of the tables' hover in which the mean of the air is taken to be zero, for example
+    /// 0..150s; the rest is measured from it, and held against the mapping's truth
+    #[arg(long, value_name = "FROM..TO")]
+    zero: Option<ZeroStretch>,
     /// Plan that the logs were flown from: plan.json, a flight's folder, .skyc or .skyb
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Take A and u0 from this analysis.json and fit only W
+    /// Hold the law of each drone in this analysis.json, as the curve that it flew, and fit only the
+    /// updraft W, with its error; beside it the paper's way, with A and u0 held
     #[arg(long, value_name = "FILE")]
     hold: Option<PathBuf>,
     /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
@@ -89,9 +101,13 @@ pub(super) struct AnalyzeOptions {
     offset: OffsetChoice,
     /// Analyse as in the paper: windows by their medians (means where the offset is subtracted),
     /// weighted by the samples' standard deviation, tilt as with --tilt paper; the map from those
-    /// laws alone
+    /// laws alone, as with --plain
     #[arg(long)]
     paper: bool,
+    /// Give the paper's own estimate, for comparison: its two laws alone, and the map drone by drone
+    /// and second by second from them (eqs. 6 and 7)
+    #[arg(long)]
+    plain: bool,
 }
 
 /// What the map is not corrected for.
@@ -113,7 +129,7 @@ struct Uncorrected {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum LawChoice {
     /// A line that may bend, unless the calibration's windows make the signed quadratic clearly more
-    /// probable (with --paper: the law with the lower chi2)
+    /// probable (with --plain: the law with the lower chi2)
     #[default]
     Auto,
     /// u = A' V + u0
@@ -132,6 +148,9 @@ enum IndicatorChoice {
     Rpm,
     /// Electrical power (BAT: voltage times current)
     Power,
+    /// The pulse width, and a map of all that the logs hold together, by the errors that the
+    /// calibration shows of each
+    All,
 }
 
 impl From<Indicator> for IndicatorChoice {
@@ -167,6 +186,11 @@ enum OffsetChoice {
 }
 
 impl AnalyzeOptions {
+    /// Those of `updraft run`.
+    pub(super) fn of_run(plain: bool) -> Self {
+        Self { plain, ..Self::default() }
+    }
+
     fn settings(&self) -> Settings {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {
@@ -174,7 +198,7 @@ impl AnalyzeOptions {
             TiltChoice::Thrust => Tilt::Thrust,
         };
         options.indicator = match self.indicator {
-            IndicatorChoice::Pulse => Indicator::Pulse,
+            IndicatorChoice::Pulse | IndicatorChoice::All => Indicator::Pulse,
             IndicatorChoice::Rpm => Indicator::RotorSpeed,
             IndicatorChoice::Power => Indicator::Power,
         };
@@ -189,10 +213,10 @@ impl AnalyzeOptions {
             OffsetChoice::Never => OffsetRule::Never,
         };
         options.paper_windows = self.paper;
-        options.air_aware = !self.paper;
+        options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
-        Settings { options, without }
+        Settings { options, without, combine: self.indicator == IndicatorChoice::All }
     }
 }
 
@@ -204,10 +228,29 @@ struct AnalyzeOutput<'a> {
     analysis: &'a Analysis,
 }
 
+impl AnalyzeArgs {
+    /// The response and the level that tables are inverted with, if that was asked for.
+    fn level(&self) -> Result<Option<LevelWish>, WorkflowError> {
+        let asked = if self.zero.is_some() { "--zero" } else { "--vehicle" };
+        if self.zero.is_none() && self.vehicle.is_none() {
+            return Ok(None);
+        }
+        if self.csv.is_none() {
+            return Err(WorkflowError::Usage(format!(
+                "{asked} is for tables: give their mapping file with --csv. The zero of a campaign's \
+                 logs comes from its calibration flight, and their vehicle from its folder"
+            )));
+        }
+        let zero_s = self.zero.map(|ZeroStretch(zero_s)| zero_s);
+        Ok(Some(LevelWish { vehicle: self.vehicle.clone(), zero_s }))
+    }
+}
+
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
     let request = Request {
         paths: args.paths.clone(),
         tables: args.csv.clone(),
+        level: args.level()?,
         plan: args.plan.clone(),
         start_unix_s: args.start,
         origin: args.logs.map(Into::into),

@@ -26,6 +26,7 @@ mod sweep;
 mod timetable;
 pub mod tools;
 mod words;
+mod zero;
 
 use std::process::ExitCode;
 

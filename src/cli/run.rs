@@ -73,11 +73,21 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "SPEC", value_parser = air_specs)]
     calibration_air: Vec<AirSpecs>,
     #[command(flatten)]
+    estimate: EstimateArgs,
+    #[command(flatten)]
     hide: HideArgs,
     #[command(flatten)]
     air: AirArgs,
     #[command(flatten)]
     mission: MissionArgs,
+}
+
+/// Which estimate is made of what was flown.
+#[derive(Clone, Copy, Debug, Args)]
+struct EstimateArgs {
+    /// Analyse with the paper's own estimate, for comparison (see `analyze --plain`)
+    #[arg(long)]
+    plain: bool,
 }
 
 pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandError> {
@@ -90,7 +100,8 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     if flown.ending == Ending::NoGo {
         return Ok(Exit::Unsafe);
     }
-    let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
+    let exit =
+        analyze_campaign(context, &args.output, &AnalyzeOptions::of_run(args.estimate.plain))?;
     context.say(&format!("Done in {watch}"));
     Ok(if flown.ending == Ending::Losses { Exit::Losses } else { exit })
 }

@@ -8,6 +8,7 @@ use crate::base::estimate::Estimate;
 use crate::flight::{self, Alignment};
 use crate::mission::plan::Purpose;
 
+use super::headline;
 use super::law;
 use super::text::{
     NONE, clean, count, estimate, fixed, quantity, reduced, rejection, signed, symbol, unit, usable,
@@ -78,6 +79,9 @@ fn significant(value: f64) -> String {
 
 /// A fit in one line: `A = 8.139 ± 0.012 µs/(m/s)², …`.
 pub(super) fn fit_line(fit: &Fit) -> String {
+    if let Some(beyond) = headline::beyond(fit) {
+        return format!("no minimum: W* {beyond} m/s, A and u₀ not determined");
+    }
     let mut parts: Vec<String> = fit
         .parameters
         .iter()
@@ -218,7 +222,16 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
     let laws = law::flight_laws(flight)?;
     let (linear, quadratic) = (laws.linear.as_ref(), laws.signed_quadratic.as_ref());
     let chi2 = |fit: Option<&Fit>| fit.and_then(|fit| fit.chi2_reduced).filter(|v| usable(*v));
+    if let Some(words) = headline::bent_words(flight) {
+        return Some(words);
+    }
     let better = prefer::better_of(laws)?;
+    if better == LawKind::Linear && headline::preferred(flight) == Some(LawKind::SignedQuadratic) {
+        return Some(format!(
+            "the signed-quadratic law is the more probable one ({})",
+            flight.headline.as_ref().map_or_else(String::new, |headline| clean(&headline.reason))
+        ));
+    }
     let (name, this, other) = match better {
         LawKind::Linear => (better.name(), chi2(linear), chi2(quadratic)),
         LawKind::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
@@ -266,6 +279,9 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         fit.and_then(|fit| fit.parameter(symbol)).map_or_else(
             || NONE.to_owned(),
             |p| {
+                if let Some(beyond) = fit.and_then(headline::beyond) {
+                    return if symbol == Symbol::W { beyond } else { NONE.to_owned() };
+                }
                 if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
             },
         )

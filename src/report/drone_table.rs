@@ -7,6 +7,7 @@ use crate::analysis::result::FlightAnalysis;
 
 use super::compare::{clock, drone_laws, flags, windows_used};
 use super::figures::air::mean_truth;
+use super::headline::{bent_cells, bent_heads, held_cell};
 use super::law;
 use super::notes::shared_flags;
 use super::text::{NONE, estimate, fixed, shortened, unit, usable};
@@ -14,6 +15,7 @@ use super::text::{NONE, estimate, fixed, shortened, unit, usable};
 /// Headings and rows of the table of drones; columns that no drone fills are left out.
 pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
     let effort = unit(flight.indicator.unit());
+    let [bent_u0_head, bent_slope_head] = bent_heads(flight.indicator);
     let heads = [
         ("slot", true),
         ("drone", false),
@@ -21,6 +23,9 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("systematic ± (m/s)", true),
         ("true W (m/s)", true),
         ("mapping", false),
+        ("W held (m/s)", true),
+        (&*bent_u0_head, true),
+        (&*bent_slope_head, true),
         (&*format!("A ({effort}/(m/s)²)"), true),
         (&*format!("u₀ ({effort})"), true),
         (
@@ -49,6 +54,7 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 map.drones.iter().find(|air| air.slot == drone.slot && air.name == drone.name)
             });
             let none = || NONE.to_owned();
+            let [bent_u0, bent_slope] = bent_cells(flight, drone);
             let cells = vec![
                 drone.slot.map_or_else(none, |slot| slot.to_string()),
                 shortened(&drone.name, 28),
@@ -57,6 +63,9 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                     .map_or_else(none, |air| fixed(air.systematic_mps, 2)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
                 air.map_or_else(none, |air| air.mapping.name().to_owned()),
+                held_cell(drone),
+                bent_u0,
+                bent_slope,
                 laws.a,
                 laws.u0,
                 laws.w,

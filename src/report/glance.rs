@@ -14,6 +14,7 @@ use crate::base::estimate::Estimate;
 use super::compare::{better_words, drones_of, flags, nothing};
 use super::figures::air;
 use super::fleet_air::fleet_air;
+use super::headline;
 use super::law;
 use super::page::capitalised;
 use super::text::{clean, count, error_of, fixed, signed, unit, usable, value_of};
@@ -49,6 +50,12 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     if let (Some(values), None) = (fitted.next(), fitted.next()) {
         for (label, of, unit) in values {
             tile(value_of(of), label, format!("± {} {unit}", error_of(of)));
+        }
+    }
+    for flight in &analysis.flights {
+        if let Some(w) = headline::held(flight).and_then(|held| held.updraft) {
+            let label = format!("W against the calibration, {}", clean(&flight.name));
+            tile(value_of(w), label, format!("± {} m/s", error_of(w)));
         }
     }
     if let Some((rms, fits)) = fit_error(analysis) {
@@ -92,7 +99,7 @@ fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
             let truth = flight.true_updraft_mps.unwrap_or(f64::NAN);
             flight.drones.iter().filter_map(move |drone| {
                 let fit = law::signed_quadratic(drone.laws.as_ref()?);
-                let error = fit?.value(Symbol::W)? - truth;
+                let error = fit.filter(|fit| fit.w_beyond_mps.is_none())?.value(Symbol::W)? - truth;
                 usable(error).then_some(error * error)
             })
         })
@@ -102,10 +109,16 @@ fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
 
 /// The fleet's parameters for the tiles: from its table, else from the laws of the flight.
 fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
+    if let Some(line) = headline::bent_line(flight) {
+        let unit = unit(&Symbol::Slope.unit(flight.indicator));
+        return vec![("A′ in hover, line that bends".to_owned(), line.slope, unit)];
+    }
     let laws = law::flight_laws(flight);
     let vertex = law::vertex_mps(flight).is_some();
     // The numbers of the law that describes the flight; the other one's would only mislead.
-    let better = laws.and_then(prefer::better_of).unwrap_or(LawKind::SignedQuadratic);
+    let better = headline::preferred(flight)
+        .or_else(|| laws.and_then(prefer::better_of))
+        .unwrap_or(LawKind::SignedQuadratic);
     let (table_law, wanted): (_, &[(Symbol, &str)]) = match better {
         LawKind::Linear => (TableLaw::Linear, &[(Symbol::Slope, "A′, linear law")]),
         LawKind::SignedQuadratic => (
@@ -123,7 +136,8 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
                 .find(|row| row.law == table_law && row.parameter == of_row && row.n > 1)
                 .map(|row| (Estimate::new(row.mean, row.sd), unit(&row.unit)));
             let own = || {
-                let found = law::fit_of(laws?, better)?.parameter(symbol)?;
+                let fit = law::fit_of(laws?, better).filter(|fit| fit.w_beyond_mps.is_none())?;
+                let found = fit.parameter(symbol)?;
                 Some((found.estimate, unit(&found.unit)))
             };
             let (of, unit) = row.or_else(own)?;
@@ -158,6 +172,9 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
                 let _ = write!(text, ", laws fitted for {fitted}");
             }
             if let Some(words) = better_words(flight) {
+                let _ = write!(text, ", {words}");
+            }
+            if let Some(words) = headline::held_words(flight) {
                 let _ = write!(text, ", {words}");
             }
             if let Some(air) = flight.map.as_ref().and_then(fleet_air) {

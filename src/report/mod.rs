@@ -28,6 +28,7 @@ mod gap_parts;
 mod gap_terminal;
 mod gap_words;
 mod glance;
+mod headline;
 mod law;
 pub mod next_terminal;
 mod notes;

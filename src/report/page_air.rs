@@ -7,7 +7,7 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::axis::decimals_of;
 use super::colour::diverging;
-use super::figures::{air, averaging, correlation, evolution, map as figure_map, track};
+use super::figures::{air, averaging, correlation, evolution, levelled, map as figure_map, track};
 use super::film::film;
 use super::frames::Frames;
 use super::page::{Gallery, capitalised, flight_key};
@@ -44,6 +44,7 @@ pub(super) fn air_section(
         frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, wind(flight))),
         track::figure(flight, &key, map),
         air::figure(flight, &key, map),
+        levelled::figure(flight, &key, map),
     ]
     .into_iter()
     .flatten()
@@ -61,7 +62,9 @@ pub(super) fn air_section(
         let averaging = found
             .averaging
             .as_ref()
-            .and_then(|averaging| averaging::figure(flight, &key, averaging))
+            .and_then(|averaging| {
+                averaging::figure(flight, &key, averaging, found.baseline.as_ref())
+            })
             .map(|figure| figures.show(figure));
         context! { correlations, averaging, ..scales::section(found) }
     });

@@ -199,6 +199,9 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
     if let Some(wind) = &of.wind {
         say(&wind.words);
     }
+    if let Some(baseline) = &of.baseline {
+        say(&baseline.words);
+    }
     let record = &of.record;
     context! {
         rows,
@@ -261,7 +264,12 @@ mod tests {
     fn gusts_are_said_to_make_estimates_shorter_only_beside_a_field() {
         let field =
             TrueField { sd_mps: 0.5, lambda_m: 145.0, lambda_y_m: 145.0, ..TrueField::default() };
-        let gusts = TrueGusts { spectrum: "von Karman".to_owned(), sd_mps: 0.2, length_m: 30.0 };
+        let gusts = TrueGusts {
+            spectrum: "von Karman".to_owned(),
+            sd_mps: 0.2,
+            length_m: 30.0,
+            time_s: None,
+        };
         let both = TrueAir { field: Some(field), gusts: vec![gusts.clone()] };
         assert!(true_air_words(&both).contains("come out shorter"));
         let alone = TrueAir { field: None, gusts: vec![gusts] };

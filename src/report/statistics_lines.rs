@@ -1,4 +1,4 @@
-//! The statistics of a hover in at most four lines, beside the paper's values.
+//! The statistics of a hover in a few lines, beside the paper's values.
 
 use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{FieldStatistics, Scale};
@@ -13,10 +13,12 @@ pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
         .into_iter()
         .flatten()
         .collect();
-    if lines.is_empty() {
-        return statistics.absent.first().map(|reason| clean(reason)).into_iter().collect();
+    let has_scales = !lines.is_empty();
+    if !has_scales {
+        lines.extend(statistics.absent.first().map(|reason| clean(reason)));
     }
-    lines.extend(statistics.true_air.as_ref().map(true_air_words));
+    lines.extend(statistics.baseline.as_ref().map(|baseline| clean(&baseline.words)));
+    lines.extend(statistics.true_air.as_ref().filter(|_| has_scales).map(true_air_words));
     lines
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, UpdraftMap};
 use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
@@ -13,6 +13,7 @@ use super::compare::{
 };
 use super::figures::air::mean_truth;
 use super::fleet_air::fleet_air;
+use super::headline::{bent_cells, bent_line, held, held_cell, held_words};
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::statistics_lines::statistics_lines;
@@ -125,10 +126,14 @@ impl Output {
         if let Some(words) = better_words(flight) {
             self.wrapped("", "  ", &format!("{}.", capitalised(&words)));
         }
+        if let Some(words) = held_words(flight) {
+            self.wrapped("", "  ", &format!("{}.", capitalised(&words)));
+        }
         self.fleet_table(flight);
         self.flock(flight);
         if let Some(map) = &flight.map {
             self.map(map);
+            self.levelled(map, flight.indicator.unit());
         }
         for line in statistics_lines(flight) {
             self.wrapped("", "  ", &line);
@@ -212,12 +217,19 @@ impl Output {
 
     fn drones(&mut self, flight: &FlightAnalysis) {
         let added = if flight.indicator == Indicator::Pulse { "added µs" } else { "added" };
-        let columns = [
+        // What is preferred stands first, and the paper's law gives way where there is no room.
+        let bent = bent_line(flight).is_some();
+        let held = held(flight).is_some();
+        let [law, constant, vertex] = if bent || held { [9, 10, 8] } else { [1, 2, 0] };
+        let mut columns = vec![
             column("slot", Align::Right, 0),
             column("name", Align::Left, 3),
-            column("A", Align::Right, 1),
-            column("u₀", Align::Right, 2),
-            column("W*", Align::Right, 0),
+            column("W held", Align::Right, 0),
+            column("u₀ in hover", Align::Right, 1),
+            column("A′ in hover", Align::Right, 0),
+            column("A", Align::Right, law),
+            column("u₀", Align::Right, constant),
+            column("W*", Align::Right, vertex),
             column("χ²/ν", Align::Right, 6),
             column("A′", Align::Right, 0),
             column("χ²/ν (linear)", Align::Right, 6),
@@ -235,9 +247,13 @@ impl Output {
             .take(DRONE_LIMIT)
             .map(|drone| {
                 let laws = drone_laws(drone);
+                let [bent_u0, bent_slope] = bent_cells(flight, drone);
                 vec![
                     drone.slot.map_or_else(|| NONE.to_owned(), |slot| slot.to_string()),
                     shortened(&drone.name, 16),
+                    held_cell(drone),
+                    bent_u0,
+                    bent_slope,
                     laws.a,
                     laws.u0,
                     laws.w,
@@ -251,6 +267,13 @@ impl Output {
                 ]
             })
             .collect();
+        let shown = |index: usize| match index {
+            2 => held,
+            3 | 4 => bent,
+            _ => true,
+        };
+        let rows: Vec<Vec<String>> = rows.into_iter().map(|row| kept(row, shown)).collect();
+        columns = kept(columns, shown);
         if rows.is_empty() {
             return;
         }
@@ -273,7 +296,7 @@ impl Output {
             "",
             "  ",
             &format!(
-                "vertical air speed W*, m/s: mean {} {}, {} ({} law)",
+                "vertical air speed W*, m/s: mean {} {}, {} ({})",
                 signed(air.mean, 3),
                 air.error.words(3),
                 match air.n {
@@ -286,7 +309,10 @@ impl Output {
                         signed(air.highest, 2)
                     ),
                 },
-                map.law.name(),
+                match &map.levelled {
+                    Some(_) => "a response with its level fitted".to_owned(),
+                    None => format!("{} law", map.law.name()),
+                },
             ),
         );
         if let Some(reason) = &map.law_reason {
@@ -353,7 +379,21 @@ impl Output {
                 ),
             );
         }
+        for thermal in &map.thermals {
+            self.wrapped("", "  ", &thermal.sentence());
+        }
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
+    }
+
+    /// Level and comparison of a map by a vehicle's response, and what several indicators say together.
+    fn levelled(&mut self, map: &UpdraftMap, unit: &str) {
+        let levelled = map.levelled.as_ref();
+        let of_level = levelled.map(|found| found.level_words(unit)).unwrap_or_default();
+        let held_out = levelled.map(LevelledMap::held_out_words).unwrap_or_default();
+        let combined = map.combined.as_ref().map(|combined| combined.words.clone());
+        for words in of_level.into_iter().chain(held_out).chain(combined) {
+            self.wrapped("", "  ", &clean(&words));
+        }
     }
 
     /// The map as numbers, forward up and left to the left; nothing where places form no small grid.
@@ -408,4 +448,9 @@ fn style_of(value: f64, largest: f64) -> &'static str {
     } else {
         ""
     }
+}
+
+/// What of a row is shown.
+fn kept<T>(row: Vec<T>, shown: impl Fn(usize) -> bool) -> Vec<T> {
+    row.into_iter().enumerate().filter(|(index, _)| shown(*index)).map(|(_, cell)| cell).collect()
 }

@@ -118,7 +118,9 @@ fn evaluation(
         .iter()
         .map(|(_, record)| {
             let laws = calibrate(&(*record)?.windows, &held).ok()?;
-            value(laws.signed_quadratic_held.as_ref()?, Symbol::W)
+            // A W at the edge of the searched range is none.
+            let fit = laws.signed_quadratic_held.filter(|fit| fit.w_beyond_mps.is_none())?;
+            value(&fit, Symbol::W)
         })
         .collect();
     let conditions: Vec<ConditionResult> = study

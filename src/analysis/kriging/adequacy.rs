@@ -62,11 +62,10 @@ pub(super) fn judge(innovations: &[f64], drones: &[usize]) -> Adequacy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng as _;
     use rand_distr::{Distribution as _, StandardNormal};
 
     fn drawn(seed: u64, count: usize) -> Vec<f64> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = rand_pcg::Pcg64::new(u128::from(seed), 7);
         (0..count).map(|_| StandardNormal.sample(&mut rng)).collect()
     }
 

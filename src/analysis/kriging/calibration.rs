@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{Air, Covariance};
+use super::covariance::{Air, Covariance, Form};
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
@@ -18,9 +18,12 @@ const STRENGTHS: [(f64, f64); 5] = [(0.45, 0.1), (0.7, 0.2), (1.0, 0.4), (1.4, 0
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
 /// White scatter of the windows' averages besides their noise, us. A grid.
-const WHITES_US: [f64; 3] = [0.1, 0.5, 2.0];
-/// Pairs of drones whose distances stand for those of all.
-const PAIRS: usize = 24;
+const WHITES_US: [f64; 3] = [0.3, 1.0, 3.0];
+/// Drones that stand for all.
+const STAND_INS: usize = 8;
+/// Nodes of the mean over a window, as shares of its length from its middle on, with their weights (Gauss and Legendre).
+const NODES: [(f64, f64); 3] =
+    [(-0.387_298_335, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_335, 5.0 / 18.0)];
 
 /// The law of the fleet in air of one kind.
 #[derive(Clone, Debug)]
@@ -33,11 +36,29 @@ pub(super) struct Component {
     pub(super) log_weight: f64,
 }
 
+/// The covariance that windows are judged by. Of a smooth field the differences between windows that follow each other
+/// would be known to a fraction of a microsecond, and whatever a law does not describe would be extrapolated to metres
+/// per second; an exponential one with the same scales leaves them their doubt.
+fn rough(air: &Air) -> Covariance {
+    Covariance::new(Air { form: Form::Exponential, ..*air })
+}
+
+impl CellAt {
+    /// Time and height at a share of the window's length from its middle on.
+    fn at(&self, share: f64) -> (f64, f64) {
+        let by_s = share * self.span_s;
+        (self.time_s + by_s, self.height_m + by_s * self.climb_mps)
+    }
+}
+
 /// The windows of a calibration with where the drones were.
 pub(in super::super) struct Calibration<'a> {
     windows: &'a Windows,
-    /// Distances of pairs of drones, m.
+    /// From each of some drones to each other of them, m: the covariance of *their* average is one, however the air
+    /// drifts, which a choice of pairs would not give.
     pairs_m: Vec<[f64; 2]>,
+    /// How many these are.
+    stand_ins: f64,
     /// Drones in a window, on average.
     drones: f64,
 }
@@ -45,18 +66,25 @@ pub(in super::super) struct Calibration<'a> {
 impl<'a> Calibration<'a> {
     /// `homes_m` are the drones' places on the level.
     pub(in super::super) fn new(windows: &'a Windows, homes_m: &[[f64; 2]]) -> Self {
+        let count = homes_m.len().min(STAND_INS);
+        // Spread over the list, and by no step that follows the rows of a grid.
+        let chosen =
+            (0..count).map(|index| (index as f64 * homes_m.len() as f64 / count as f64) as usize);
+        let stand_ins: Vec<[f64; 2]> =
+            chosen.filter_map(|index| homes_m.get(index).copied()).collect();
         let mut pairs_m: Vec<[f64; 2]> = Vec::new();
-        for (index, one) in homes_m.iter().enumerate() {
-            for other in &homes_m[index + 1..] {
+        for (index, one) in stand_ins.iter().enumerate() {
+            for other in &stand_ins[index + 1..] {
                 pairs_m.push([one[0] - other[0], one[1] - other[1]]);
             }
         }
-        pairs_m.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
-        let step = (pairs_m.len() as f64 / PAIRS as f64).max(1.0);
-        let chosen = (0..PAIRS).map(|index| ((index as f64 + 0.5) * step) as usize);
-        let pairs_m = chosen.filter_map(|index| pairs_m.get(index).copied()).collect();
         let members = windows.cells.iter().map(|cell| cell.drones as f64);
-        Self { windows, pairs_m, drones: crate::numeric::mean(members).unwrap_or(1.0).max(1.0) }
+        Self {
+            windows,
+            pairs_m,
+            stand_ins: count.max(1) as f64,
+            drones: crate::numeric::mean(members).unwrap_or(1.0).max(1.0),
+        }
     }
 
     /// Covariance of the averages over drones of the air in two windows, (m/s)²; and of one drone's own
@@ -68,27 +96,32 @@ impl<'a> Calibration<'a> {
         other: &CellAt,
         taller: f64,
     ) -> (f64, f64) {
-        let dt = one.time_s - other.time_s;
-        let dz = (one.height_m - other.height_m) / taller;
-        let own = covariance.field([0.0, 0.0, dz], dt);
-        let gusts = covariance.gusts(dt);
+        let gusts = covariance.gusts(one.time_s - other.time_s);
+        let over = |x_m: f64, y_m: f64| {
+            let mut sum = 0.0;
+            for (at, weight) in NODES {
+                for (other_at, other_weight) in NODES {
+                    let (time_s, height_m) = one.at(at);
+                    let (other_s, other_m) = other.at(other_at);
+                    let apart_m = [x_m, y_m, (height_m - other_m) / taller];
+                    sum += weight * other_weight * covariance.instant(apart_m, time_s - other_s);
+                }
+            }
+            sum
+        };
+        let own = over(0.0, 0.0);
         if self.pairs_m.is_empty() {
             return (own + gusts, 0.0);
         }
-        let mut sum = 0.0;
-        for [x, y] in &self.pairs_m {
-            sum +=
-                0.5 * (covariance.field([*x, *y, dz], dt) + covariance.field([-*x, -*y, dz], dt));
-        }
-        let apart = sum / self.pairs_m.len() as f64;
-        let share = 1.0 / self.drones;
-        (share * (own + gusts) + (1.0 - share) * apart, (own + gusts - apart).max(0.0))
+        let each = self.pairs_m.iter().map(|[x_m, y_m]| over(*x_m, *y_m) + over(-x_m, -y_m));
+        let shared = (own * self.stand_ins + each.sum::<f64>()) / self.stand_ins.powi(2);
+        (shared + gusts / self.drones, own + gusts - shared)
     }
 
     /// The fleet's law under all that is left open in air of these scales.
     pub(super) fn components(&self, air: &Air) -> Vec<Component> {
-        let covariance = Covariance::new(*air);
-        let Windows { record, cells, parameters } = self.windows;
+        let covariance = rough(air);
+        let cells = &self.windows.cells;
         let mut found = Vec::new();
         for (taller, tall_weight) in TALLER {
             let shared = DMatrix::from_fn(cells.len(), cells.len(), |row, column| {
@@ -103,25 +136,44 @@ impl<'a> Calibration<'a> {
                     let air = |row: usize, column: usize| {
                         strength * strength * shared[(row.max(column), row.min(column))]
                     };
-                    let Some(fit) = record.fit_in(air, white_us) else { continue };
-                    let Gls { gain, covariance, log_likelihood } = fit;
-                    let law = gain * &record.pulse_us;
-                    let mut shift = [0.0; PARAMETERS];
-                    shift
-                        .iter_mut()
-                        .zip(law.iter().zip(parameters))
-                        .for_each(|(shift, (law, used))| *shift = law - used);
-                    let log_weight = log_likelihood + (weight * tall_weight).ln();
-                    found.push(Component { shift, covariance, log_weight });
+                    found.extend(self.component(air, white_us, (weight * tall_weight).ln()));
                 }
             }
         }
         found
     }
 
+    /// The fleet's law in air of known scales, alike in all directions and as strong as they say.
+    pub(super) fn known(&self, air: &[Air]) -> Option<Component> {
+        let air: Vec<Covariance> = air.iter().map(rough).collect();
+        let cells = &self.windows.cells;
+        let shared = |row: usize, column: usize| {
+            air.iter().map(|part| self.air(part, &cells[row], &cells[column], 1.0).0).sum()
+        };
+        self.component(shared, WHITES_US[0], 0.0)
+    }
+
+    /// The fleet's law in air with a covariance between windows; `None` where they do not determine it.
+    fn component(
+        &self,
+        air: impl Fn(usize, usize) -> f64,
+        white_us: f64,
+        ln_weight: f64,
+    ) -> Option<Component> {
+        let Windows { record, parameters, .. } = self.windows;
+        let Gls { gain, covariance, log_likelihood } = record.fit_in(air, white_us)?;
+        let law = gain * &record.pulse_us;
+        let mut shift = [0.0; PARAMETERS];
+        shift
+            .iter_mut()
+            .zip(law.iter().zip(parameters))
+            .for_each(|(shift, (law, used))| *shift = law - used);
+        Some(Component { shift, covariance, log_weight: log_likelihood + ln_weight })
+    }
+
     /// Standard error of one drone's constant against the fleet's by air that it met alone, us.
     pub(super) fn own_us(&self, air: &Air) -> f64 {
-        let covariance = Covariance::new(*air);
+        let covariance = rough(air);
         let Windows { record, cells, .. } = self.windows;
         let alone =
             |row: usize, column: usize| self.air(&covariance, &cells[row], &cells[column], 1.0).1;

@@ -4,6 +4,7 @@
 //! meets alone. What is asked for is the covariance of running means: gusts of a few seconds are mostly
 //! averaged away, and the field nearly not at all.
 
+use super::along::along;
 use crate::analysis::running::RUNNING_S;
 
 /// Nodes of the mean over the difference of two times within windows of 10 s, as a share of the window, with their
@@ -59,6 +60,8 @@ pub(super) struct Spot {
     pub(super) time_s: f64,
     /// Gusts are shared only by what has the same number; `None`: meets none.
     pub(super) drone: Option<usize>,
+    /// How fast it moves: its means over 10 s are means over that long a way, m/s.
+    pub(super) velocity_mps: [f64; 3],
 }
 
 /// The covariance function of an air, with what does not depend on the spots computed once.
@@ -84,7 +87,12 @@ impl Covariance {
     pub(super) fn of(&self, one: &Spot, other: &Spot) -> f64 {
         let apart_s = one.time_s - other.time_s;
         let apart_m = [0, 1, 2].map(|axis| one.place_m[axis] - other.place_m[axis]);
-        let field = self.field(apart_m, apart_s);
+        let velocities = [one.velocity_mps, other.velocity_mps];
+        let field = if velocities == [[0.0; 3]; 2] {
+            self.field(apart_m, apart_s)
+        } else {
+            along(self, apart_m, apart_s, velocities)
+        };
         if one.drone.is_some() && one.drone == other.drone {
             field + self.gusts(apart_s)
         } else {
@@ -112,6 +120,19 @@ impl Covariance {
                 };
         }
         variance * sum
+    }
+
+    /// Covariance of the field itself, not of means, (m/s)².
+    pub(super) fn instant(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+        let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
+        let r = self.distance([x - u * apart_s, y - v * apart_s, z]);
+        let t = apart_s.abs() / time_s;
+        sd_mps
+            * sd_mps
+            * match form {
+                Form::Exponential => (-r - t).exp(),
+                Form::Gaussian => (-r * r - t * t).exp(),
+            }
     }
 
     /// Covariance of a drone's own gusts, (m/s)².
@@ -161,7 +182,7 @@ mod tests {
     }
 
     fn spot(place_m: [f64; 3], time_s: f64, drone: usize) -> Spot {
-        Spot { place_m, time_s, drone: Some(drone) }
+        Spot { place_m, time_s, drone: Some(drone), velocity_mps: [0.0; 3] }
     }
 
     /// The mean of a correlation over two windows, by summing.

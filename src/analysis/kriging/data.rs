@@ -71,7 +71,9 @@ impl Rows {
                 common[PARAMETERS..UNIFORM].copy_from_slice(&value.doubts_mps);
                 common[UNIFORM] = 1.0;
                 place[index][block] = Some(rows.len());
-                let spot = Spot { place_m, time_s: *second as f64, drone: Some(index) };
+                let velocity_mps = drone.velocity_at(*second);
+                let time_s = *second as f64;
+                let spot = Spot { place_m, time_s, drone: Some(index), velocity_mps };
                 let noise_mps = value.noise_mps.max(LEAST_NOISE_MPS);
                 rows.push(Row { spot, value_mps: value.updraft_mps, common, noise_mps });
             }
@@ -86,6 +88,19 @@ const LEAST_NOISE_MPS: f64 = 0.005;
 impl Drone {
     pub(super) fn place_at(&self, second: usize) -> Option<[f64; 3]> {
         self.place_m.get(second).or(self.place_m.last()).copied()
+    }
+
+    /// How fast it moves around a second, by its places 2 s before and after, m/s.
+    pub(super) fn velocity_at(&self, second: usize) -> [f64; 3] {
+        let Some(last) = self.place_m.len().checked_sub(1).filter(|last| *last > 0) else {
+            return [0.0; 3];
+        };
+        let (from, to) = (second.saturating_sub(2).min(last), (second + 2).min(last));
+        if from == to {
+            return [0.0; 3];
+        }
+        [0, 1, 2]
+            .map(|axis| (self.place_m[to][axis] - self.place_m[from][axis]) / (to - from) as f64)
     }
 
     /// Whether it stands still in the map.

@@ -4,11 +4,14 @@ use super::adequacy::{Adequacy, judge};
 use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
 use super::data::{Drone, Rows, UNIFORM};
+use super::grid::{Grid, grid};
+use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
 use super::scales::{
     Found, LN_LENGTH, LN_TIME, Sample, Search, UNIFORM_MPS, log_prior, open_factor,
 };
+use super::thermals::{Record, Thermal};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::running::RUNNING_S;
@@ -56,6 +59,8 @@ pub(in super::super) struct Posterior {
     pub(in super::super) drones: Vec<Series>,
     /// At the places without a log.
     pub(in super::super) lost: Vec<Series>,
+    /// Between them; `None` for fleets that move.
+    pub(in super::super) grid: Option<Grid>,
     /// Mean over all drones and seconds with its standard error, m/s.
     pub(in super::super) fleet_mps: Option<(f64, f64)>,
     pub(in super::super) air: Air,
@@ -66,6 +71,7 @@ pub(in super::super) struct Posterior {
     pub(in super::super) zero_shift_mps: f64,
     /// Probability of an updraft that is everywhere the same.
     pub(in super::super) uniform_probability: f64,
+    pub(in super::super) thermals: Vec<Thermal>,
 }
 
 /// One choice of everything that is not linear, with what follows.
@@ -83,7 +89,9 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     if rows.rows.len() < FEWEST {
         return None;
     }
-    let neighbours = before(input.drones, &rows, REACH);
+    let moves = input.drones.iter().any(|drone| !drone.hovers());
+    let all = before(input.drones, &rows, if moves { moving::REACH } else { REACH });
+    let neighbours = if moves { moving::thinned(&all) } else { all.clone() };
     let roughly: Vec<f64> =
         input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();
     let search = Search {
@@ -93,7 +101,17 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         wind_mps: input.wind_mps,
         factor: open_factor(&prior_factor(None, false)),
     };
-    let found = search.best()?;
+    let mut found = search.best()?;
+    let mut search = search;
+    if let (true, None) = (moves, input.wind_mps) {
+        search.wind_mps = moving::drift(&search, &found);
+        if search.wind_mps.is_some() {
+            found = search.best()?;
+        }
+    }
+    let record =
+        Record { search: &search, drones: input.drones, found: &found, wind_mps: input.wind_mps };
+    let thermals = record.thermals();
     let air = search.air(found.form, &found.best);
     // Air that each drone met alone in its calibration is in its constant.
     let own = input.calibration.own_us(&air) / input.slope.max(1.0);
@@ -106,12 +124,20 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
         Some((log_likelihood + log_prior(point), choices))
     });
-    let (mean, covariance, uniform_probability) = mixed(&samples)?;
+    let search = Search { neighbours: &all, ..search };
     let system = search.system(found.form, &found.best)?;
+    let (mean, covariance, uniform_probability) = if moves {
+        // With all values: the samples had only some.
+        let components = input.calibration.components(&air);
+        let sample = Sample { point: found.best, weight: 1.0 };
+        mixed(&[(sample, choices(&system, &components))])?
+    } else {
+        mixed(&samples)?
+    };
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
     let model = Model { drones: input.drones, covariance: Covariance::new(air), linear };
-    let adequacy = adequate(&model, &rows, &neighbours);
+    let adequacy = adequate(&model, &rows, &all);
     let mut sites: Vec<(Option<usize>, [f64; 3])> = (0..input.drones.len())
         .map(|index| (Some(index), input.drones[index].place_at(0).unwrap_or_default()))
         .collect();
@@ -124,6 +150,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     }
     let zero_shift_mps = shift(&model, &rows);
     Some(Posterior {
+        grid: grid(&model, input.lost_m, first),
         fleet_mps: model.fleet(&rows),
         drones,
         lost,
@@ -133,12 +160,13 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         adequacy,
         zero_shift_mps,
         uniform_probability,
+        thermals,
     })
 }
 
 /// Factor of the common errors' covariance: a component's law (none: not known), the doubts, and a uniform
 /// updraft or none.
-fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
+pub(super) fn prior_factor(component: Option<&Component>, is_uniform: bool) -> Common {
     let mut prior = Common::zeros();
     if let Some(component) = component {
         let law = factor(&component.covariance);

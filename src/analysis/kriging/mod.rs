@@ -12,15 +12,25 @@
 //! ([`calibration`]); and the map is the posterior mean with its standard deviation ([`predict`]).
 
 mod adequacy;
+mod along;
 mod calibration;
 mod covariance;
 mod data;
+mod grid;
+mod limit;
 mod make;
+mod moving;
+#[cfg(test)]
+mod moving_tests;
 mod neighbours;
 mod predict;
 mod scales;
+mod thermals;
 mod vecchia;
 
 pub(super) use calibration::Calibration;
+pub(super) use covariance::{Air, Form};
 pub(super) use data::{Drone, Value};
+pub(super) use limit::{Best, best};
 pub(super) use make::{Input, Scale, posterior};
+pub(super) use thermals::{Known, Thermal};

@@ -41,6 +41,11 @@ pub(super) struct Neighbours {
     pub(super) rows: Vec<Vec<u32>>,
 }
 
+impl Neighbours {
+    /// Pattern of what is no target.
+    pub(super) const SKIPPED: usize = usize::MAX;
+}
+
 /// Noise in steps of a quarter: what differs by less is one pattern.
 fn noise_step(noise_mps: f64) -> i32 {
     (4.0 * noise_mps.log2()).round() as i32
@@ -197,7 +202,8 @@ pub(super) fn around(
                 let after = (block + 2..rows.seconds.len()).take(BACK);
                 near.extend(after.filter_map(|block| at(own, block)).take(reach.own));
             }
-            let spot = Spot { place_m, time_s: *second as f64, drone: *drone };
+            let velocity_mps = drone.map_or([0.0; 3], |drone| drones[drone].velocity_at(*second));
+            let spot = Spot { place_m, time_s: *second as f64, drone: *drone, velocity_mps };
             collector.add(spot, drones.len() + site, 1.0, near);
         }
     }

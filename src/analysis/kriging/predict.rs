@@ -74,6 +74,22 @@ impl Model<'_> {
         found.into_iter().map(|site| site.series(&self.linear)).collect()
     }
 
+    /// The air at fixed places: for each `step` seconds from `first` on the second, and mean and standard deviation at
+    /// each place, m/s.
+    pub(super) fn over(
+        &self,
+        places_m: &[[f64; 3]],
+        first: usize,
+        step: usize,
+    ) -> Vec<(usize, Vec<Option<(f64, f64)>>)> {
+        let sites: Vec<(Option<usize>, [f64; 3])> =
+            places_m.iter().map(|place| (None, *place)).collect();
+        let found = self.phase(&sites, first, step).into_iter();
+        let known =
+            |asked: Option<Asked>| asked.map(|asked| (asked.value_mps, asked.variance.sqrt()));
+        found.map(|(second, asked)| (second, asked.into_iter().map(known).collect())).collect()
+    }
+
     /// All sites at one second of each step.
     fn phase(
         &self,
@@ -98,7 +114,7 @@ impl Model<'_> {
                     .map(|site| {
                         let target = block * sites.len() + site;
                         let weights = weights[near.of[target]].as_ref()?;
-                        Some(self.asked(weights, &near.rows[target], &rows, &left))
+                        Some(self.asked(sites[site].0, weights, &near.rows[target], &rows, &left))
                     })
                     .collect();
                 (*second, asked)
@@ -139,6 +155,14 @@ impl Model<'_> {
         Some((mean + self.linear.mean[UNIFORM], variance.sqrt()))
     }
 
+    /// What is not known of the air where no drone is near, m/s.
+    pub(super) fn unknown_mps(&self) -> f64 {
+        let mut uniform = CommonVector::zeros();
+        uniform[UNIFORM] = 1.0;
+        let uniform = self.linear.variance(&uniform, &[]);
+        (self.covariance.field([0.0; 3], 0.0) + self.covariance.gusts(0.0) + uniform).sqrt()
+    }
+
     fn own(&self, drone: usize) -> f64 {
         let answer: f64 = (0..COMMON)
             .map(|column| self.linear.answers[(drone, column)] * self.linear.mean[column])
@@ -146,7 +170,14 @@ impl Model<'_> {
         self.linear.own[drone] - answer
     }
 
-    fn asked(&self, weights: &Weights, near: &[u32], rows: &Rows, left: &[f64]) -> Asked {
+    fn asked(
+        &self,
+        drone: Option<usize>,
+        weights: &Weights,
+        near: &[u32],
+        rows: &Rows,
+        left: &[f64],
+    ) -> Asked {
         let mut value_mps = self.linear.mean[UNIFORM];
         let mut by_common = CommonVector::zeros();
         by_common[UNIFORM] = 1.0;
@@ -168,7 +199,9 @@ impl Model<'_> {
             }
         }
         let linear = self.linear.variance(&by_common, &by_own);
-        Asked { value_mps, variance: weights.variance + linear, by_common, by_own }
+        // Where nobody measured there are gusts, too.
+        let gusts = if drone.is_some() { 0.0 } else { self.covariance.gusts(0.0) };
+        Asked { value_mps, variance: weights.variance + linear + gusts, by_common, by_own }
     }
 }
 

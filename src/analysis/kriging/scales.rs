@@ -12,14 +12,14 @@ use crate::numeric::{differences, minimise};
 
 /// Scales that are searched, mostly as logarithms.
 pub(super) const SCALES: usize = 8;
-const LN_SD: usize = 0;
+pub(super) const LN_SD: usize = 0;
 pub(super) const LN_LENGTH: usize = 1;
 const STRETCH_ALONG: usize = 2;
 const STRETCH_DIAGONAL: usize = 3;
 pub(super) const LN_TIME: usize = 4;
 /// Drift as a share of the wind.
-const DRIFT: usize = 5;
-const LN_GUST: usize = 6;
+pub(super) const DRIFT: usize = 5;
+pub(super) const LN_GUST: usize = 6;
 const LN_GUST_TIME: usize = 7;
 
 /// Scales as they are searched.
@@ -34,7 +34,7 @@ const PRIOR: [(f64, f64); SCALES] = [
     (0.0, 0.35),
     (0.0, 0.35),
     (4.6, 1.0),
-    (0.5, 0.5),
+    (0.7, 1.0),
     (-2.3, 1.5),
     (1.4, 0.6),
 ];
@@ -51,6 +51,7 @@ const SAMPLES: usize = 48;
 const WIDER: f64 = 1.25;
 
 /// The likelihood of a record in its scales.
+#[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub(super) rows: &'a Rows,
     pub(super) neighbours: &'a Neighbours,
@@ -90,7 +91,7 @@ impl Search<'_> {
         air_of(form, point, self.wind_mps)
     }
 
-    fn log_posterior(&self, form: Form, point: &Point) -> f64 {
+    pub(super) fn log_posterior(&self, form: Form, point: &Point) -> f64 {
         let Some(system) = self.system(form, point) else { return f64::NEG_INFINITY };
         let likelihood = system
             .posterior(&CommonVector::zeros(), &self.factor)

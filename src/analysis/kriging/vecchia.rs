@@ -13,7 +13,7 @@ pub(super) type Common = SMatrix<f64, COMMON, COMMON>;
 pub(super) type CommonVector = SVector<f64, COMMON>;
 
 /// A drone's own constant is not known better than this, m/s. Numerical.
-const LEAST_OWN_MPS: f64 = 2e-3;
+pub(super) const LEAST_OWN_MPS: f64 = 2e-3;
 
 /// What the values around a place say about it.
 #[derive(Clone, Debug)]
@@ -97,7 +97,10 @@ impl System {
         let (mut squares, mut ln_sd) = (0.0, 0.0);
         let mut constants: Vec<(usize, f64)> = Vec::new();
         for (index, row) in rows.rows.iter().enumerate() {
-            let Weights { of, variance } = &weights[neighbours.of[index]];
+            // What is skipped is no target, but others may be conditioned on it.
+            let Some(Weights { of, variance }) = weights.get(neighbours.of[index]) else {
+                continue;
+            };
             let inverse = 1.0 / variance.sqrt();
             ln_sd -= inverse.ln();
             let mut value = row.value_mps;

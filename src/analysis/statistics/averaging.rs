@@ -1,8 +1,9 @@
 //! Allan deviation: how much averages over neighbouring spans of a hover differ.
 //!
 //! It falls with the length of the averages while they average noise and short gusts away, and rises
-//! again when slow motion of the air and drift of the pulse take over: a longer baseline then is no
-//! better one.
+//! again when slow motion of the air and drift of the pulse take over. Its minimum says how well neighbouring
+//! averages repeat, not how near they are to the mean of the air: in slow air it is at the shortest average.
+//! How long a baseline must be is said by [`super::baseline`].
 
 use std::fmt::Write as _;
 
@@ -112,13 +113,13 @@ fn sentence(found: &Averaging) -> String {
     let deviation = format!("{:.3} m/s", best.deviation_mps);
     let mut text = if best.averaging_s >= *longest {
         format!(
-            "the longer a baseline average the better, up to {longest:.0} s at least, where neighbouring \
-             averages differ by {deviation} (Allan deviation, median of the fleet)"
+            "the longer averages are the better they repeat, up to {longest:.0} s at least, where \
+             neighbouring ones differ by {deviation} (Allan deviation, median of the fleet)"
         )
     } else {
         format!(
-            "a baseline average of {:.0} s repeats best: neighbouring ones differ by {deviation} (Allan \
-             deviation, median of the fleet), and longer ones by more",
+            "averages of {:.0} s repeat best: neighbouring ones differ by {deviation} (Allan deviation, \
+             median of the fleet), and longer ones by more, as the air itself changes",
             best.averaging_s
         )
     };

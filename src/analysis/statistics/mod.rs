@@ -7,9 +7,11 @@
 //! (`likelihood.rs`).
 
 pub mod averaging;
+pub(in crate::analysis) mod baseline;
 mod curve;
 mod estimators;
 mod field;
+pub mod integral;
 mod likelihood;
 mod make;
 mod paper;

@@ -36,9 +36,12 @@ pub struct FieldStatistics {
     /// Horizontal wind from the lean of the drones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wind: Option<TiltWind>,
-    /// How long an average must be.
+    /// How much averages of one length differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaging: Option<Averaging>,
+    /// How long a baseline average must be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<Baseline>,
     /// The air that a simulated flight was flown in; absent: not known, or without scales.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub true_air: Option<TrueAir>,
@@ -71,6 +74,17 @@ pub struct TrueField {
     pub tau_s: f64,
     /// Wind that carries the field past the drones, m/s.
     pub wind_mps: f64,
+    /// Whether the correlation is Gaussian, `exp(-(r / lambda)² - (dt / tau)²)`, instead of exponential.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_gaussian: bool,
+    /// The same wind along x and y of the show frame, m/s; absent: its direction is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift_mps: Option<[f64; 2]>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Gusts with a length of their own.
@@ -82,6 +96,9 @@ pub struct TrueGusts {
     pub sd_mps: f64,
     /// Integral length, m.
     pub length_m: f64,
+    /// Correlation time of each drone's own gusts (1/e), s; absent: what the wind makes of the length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
 }
 
 /// The data that the statistics are made of.
@@ -482,8 +499,51 @@ pub struct Averaging {
     /// Shortest averages whose deviation is below round values.
     #[serde(default)]
     pub reached: Vec<Reached>,
+    /// What the deviations say, in a sentence.
+    pub words: String,
+}
+
+/// How long a baseline average must be for its mean to be that of the air.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Baseline {
+    /// Length of the record that says it, s.
+    pub record_s: f64,
+    /// The mean of one drone.
+    pub drone: BaselineOf,
+    /// The mean of all drones; absent: there is one drone, or too few together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<BaselineOf>,
     /// How long a baseline average must be, in a sentence.
     pub words: String,
+}
+
+/// How slowly a mean settles: over a time t it is off by `sigma sqrt(2 T / t)`, with T the air's integral time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaselineOf {
+    /// Standard deviation of the slow air, m/s.
+    pub sd_mps: f64,
+    /// 95 % interval of it, m/s.
+    pub sd_interval_mps: Interval,
+    /// Integral time, s.
+    pub integral_time_s: f64,
+    /// 95 % interval of it, s.
+    pub integral_time_interval_s: Interval,
+    /// Whether the record is too short to bound the integral time from above.
+    #[serde(default)]
+    pub is_open: bool,
+    /// Averages for round standard errors.
+    pub needed: Vec<NeededAverage>,
+}
+
+/// A standard error of a mean and the length of the average that has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NeededAverage {
+    /// Standard error of the mean, m/s.
+    pub error_mps: f64,
+    /// Length of the average, min.
+    pub minutes: f64,
+    /// 95 % interval of it, min.
+    pub interval_min: Interval,
 }
 
 /// The Allan deviation of one drone at each of [`Averaging::averaging_s`].

@@ -193,6 +193,7 @@ mod tests {
     #[test]
     fn a_vehicles_own_table_tells_the_wind_and_its_end_is_no_wind() {
         let table = LeanTable {
+            indicator: crate::flight::Indicator::Pulse,
             lean_step_deg: 1.0,
             wind_mps: vec![0.0, 1.5, 3.0, 4.4],
             ..LeanTable::default()

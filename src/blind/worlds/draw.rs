@@ -125,6 +125,7 @@ fn air(rng: &mut Pcg64, sd_mps: f64) -> AirSettings {
         own_mps: OWN * sd_mps,
         own_s: log_between(rng, (4.0, 15.0)),
         field: has_field.then_some(field),
+        thermal: None,
         wind_mps: [at_reference_mps * cos, at_reference_mps * sin],
         shear,
         gust_share: 0.15,

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use foreign_worlds::air::Air;
+use foreign_worlds::air::{Air, AirSettings};
 use foreign_worlds::flight::{Site, span_s};
 use foreign_worlds::{Drone, Target, World};
 use rayon::prelude::*;
@@ -76,6 +76,33 @@ pub struct Settings<'a> {
     pub stop: Option<&'a AtomicBool>,
 }
 
+/// The air that [`fly_plan`] flies a plan in.
+///
+/// # Errors
+/// When a drone's show cannot be flown.
+pub fn air_of(plan: &Plan, settings: &AirSettings, seed: u64) -> Result<Air, BlindError> {
+    let spans: Vec<[f64; 2]> = trajectories(plan)?.iter().map(flown_s).collect();
+    Ok(Air::new(settings, span_of(&spans), seed))
+}
+
+/// What the drones of a plan fly.
+fn trajectories(plan: &Plan) -> Result<Vec<Trajectory>, BlindError> {
+    let show = plan.to_show();
+    let each = plan.slots.iter().zip(&show.drones).map(|(slot, drone)| {
+        let flown = as_flown(drone);
+        let slot = slot.slot;
+        flown.map(|flown| flown.trajectory).map_err(|source| BlindError::Skyb { slot, source })
+    });
+    each.collect()
+}
+
+/// Span of show time that the air must cover, s.
+fn span_of(flown_s: &[[f64; 2]]) -> [f64; 2] {
+    let from_s = flown_s.iter().map(|span| span[0]).fold(f64::INFINITY, f64::min);
+    let to_s = flown_s.iter().map(|span| span[1]).fold(0.0, f64::max);
+    span_s(from_s, to_s)
+}
+
 /// Flies a plan: `folder` gets the logs that are not lost.
 ///
 /// # Errors
@@ -85,21 +112,9 @@ pub fn fly_plan(
     settings: &Settings<'_>,
     folder: &FlightFolder,
 ) -> Result<Flown, BlindError> {
-    let show = plan.to_show();
-    let trajectories: Vec<Trajectory> = plan
-        .slots
-        .iter()
-        .zip(&show.drones)
-        .map(|(slot, drone)| {
-            let flown = as_flown(drone);
-            let slot = slot.slot;
-            flown.map(|flown| flown.trajectory).map_err(|source| BlindError::Skyb { slot, source })
-        })
-        .collect::<Result<_, _>>()?;
+    let trajectories = trajectories(plan)?;
     let spans: Vec<[f64; 2]> = trajectories.iter().map(flown_s).collect();
-    let from_s = spans.iter().map(|span| span[0]).fold(f64::INFINITY, f64::min);
-    let to_s = spans.iter().map(|span| span[1]).fold(0.0, f64::max);
-    let air = Air::new(&settings.world.air, span_s(from_s, to_s), settings.air_seed);
+    let air = Air::new(&settings.world.air, span_of(&spans), settings.air_seed);
     let Settings { world, missing, stop, .. } = *settings;
     let count = plan.slots.len();
     let flown: Vec<Option<u64>> = plan

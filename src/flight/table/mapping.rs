@@ -45,6 +45,8 @@ pub struct Mapping {
     pub command_up: Option<Channel>,
     /// True vertical velocity of the air, m/s, up positive, if something measured it.
     pub truth: Option<Channel>,
+    /// Distance between the drone and what measured the truth, m; `None`: not told.
+    pub truth_distance_m: Option<f64>,
     /// Rules for finding windows where there is no commanded velocity.
     #[serde(default)]
     pub steps: Steps,
@@ -185,6 +187,9 @@ impl Mapping {
             if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
                 return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
             }
+        }
+        if self.truth_distance_m.is_some_and(|m| !(m.is_finite() && m >= 0.0)) {
+            return Some("truth_distance_m must be a distance, m, not below 0".to_owned());
         }
         let Steps { wobble_mps, settle_s, shortest_s } = self.steps;
         let finite = [wobble_mps, settle_s, shortest_s].iter().all(|value| value.is_finite());

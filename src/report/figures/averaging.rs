@@ -3,7 +3,7 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 
 use crate::analysis::result::FlightAnalysis;
-use crate::analysis::statistics::result::Averaging;
+use crate::analysis::statistics::result::{Averaging, Baseline};
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
@@ -16,6 +16,7 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     averaging: &Averaging,
+    baseline: Option<&Baseline>,
 ) -> Option<Figure> {
     let points: Vec<(f64, f64)> = averaging
         .averaging_s
@@ -67,15 +68,16 @@ pub(in crate::report) fn figure(
     let mut sheet = Sheet::new(760.0, 340.0);
     sheet.place(panel.draw(760.0, 340.0), 0.0, 0.0);
     let name = format!("averaging-{key}");
-    let title = format!("How long an average must be, {}", clean(&flight.name));
+    let title = format!("How much averages differ, {}", clean(&flight.name));
     Some(Figure {
         svg: sheet.svg(&name, &title),
         name,
         title,
         caption: format!(
             "Allan deviation: how much two averages of one length, one right after \
-                  the other, differ (over √2). {}",
-            sentence(&averaging.words)
+                  the other, differ (over √2). {} {}",
+            sentence(&averaging.words),
+            baseline.map_or_else(String::new, |baseline| sentence(&baseline.words))
         ),
     })
 }

@@ -238,6 +238,7 @@ fn by_drone(flights: &[&FlightAnalysis]) -> (Option<Panel>, String) {
 fn updrafts(flight: &FlightAnalysis) -> impl Iterator<Item = (usize, Option<u16>, Estimate)> {
     flight.drones.iter().enumerate().filter_map(|(index, drone)| {
         let fit = law::signed_quadratic(drone.laws.as_ref()?);
-        Some((index, drone.slot, fit?.parameter(Symbol::W)?.estimate))
+        let fit = fit.filter(|fit| fit.w_beyond_mps.is_none())?;
+        Some((index, drone.slot, fit.parameter(Symbol::W)?.estimate))
     })
 }

@@ -8,6 +8,7 @@ pub(super) mod evolution;
 pub(super) mod fleet;
 pub(super) mod gap;
 pub(super) mod laws;
+pub(super) mod levelled;
 pub(super) mod map;
 mod plan_view;
 pub(super) mod study;

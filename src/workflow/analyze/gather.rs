@@ -11,7 +11,7 @@ use crate::flight::identity::{SAME_START_S, later_s};
 use crate::mission::Plan;
 use crate::vehicle::library;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::find::{Found, Work, find, find_tables, stem, twice};
+use crate::workflow::find::{Found, LevelWish, Work, find, find_tables, level_tables, stem, twice};
 use crate::workflow::shows::load::{has_extension, load_shows};
 
 /// Request for an analysis: its input.
@@ -21,6 +21,8 @@ pub struct Request {
     pub paths: Vec<PathBuf>,
     /// Path of a mapping file of tables, instead of `paths`.
     pub tables: Option<PathBuf>,
+    /// Wish for maps of the tables' flights by a response whose level they give; `None`: by the calibration's laws.
+    pub level: Option<LevelWish>,
     /// Path of the plan that the logs were flown from.
     pub plan: Option<PathBuf>,
     /// Unix time of show time 0, s.
@@ -68,7 +70,9 @@ pub fn gather(request: &Request) -> Result<(Work, Option<Indicator>), WorkflowEr
     name_apart(&mut work.flights, &request.paths);
     let mut indicator = None;
     if let Some(mapping) = &request.tables {
-        indicator = Some(find_tables(mapping, &mut work)?);
+        let held = find_tables(mapping, &mut work)?;
+        request.level.as_ref().map_or(Ok(()), |wish| level_tables(wish, held, &mut work))?;
+        indicator = Some(held);
     }
     let first = request.first()?;
     if request.paths.len() < 2 {

@@ -16,17 +16,20 @@ pub use self::gather::{Request, gather, load_plan};
 pub use self::settings::{Settings, Uncorrected};
 use super::ending::Ending;
 use super::error::WorkflowError;
-use super::find::{Found, Work, find};
+use super::find::{Found, Work, find, lean_tables};
 use super::host::Host;
 use super::provenance::provenance;
 use crate::analysis::battery::Sag;
+use crate::analysis::combine;
+use crate::analysis::lean_table::LeanTable;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
-use crate::analysis::{FlightInput, Warning, analyze};
+use crate::analysis::{AnalysisOptions, FlightInput, Warning, analyze};
 use crate::base::file::write_with;
 use crate::base::json::write_json;
 use crate::base::plain::Shown as _;
 use crate::campaign;
 use crate::campaign::origin::LogOrigin;
+use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
@@ -103,7 +106,8 @@ impl<'a> Analysing<'a> {
     /// If nothing can be analysed, or the work is stopped.
     pub fn run(self, provenance: bool) -> Result<Analysed, WorkflowError> {
         let Self { host, work, settings, reference, doubts } = self;
-        let inputs = inputs(work, settings.without);
+        let tables = lean_tables(work, settings.options.indicator);
+        let inputs = inputs(work, &tables, settings.without);
         let logs: usize = inputs.iter().map(|input| input.logs.len()).sum();
         let progress = host.progress("analysing", logs as u64);
         // Hashing fills the pauses in which the analysis keeps one processor busy.
@@ -116,6 +120,10 @@ impl<'a> Analysing<'a> {
             || provenance.then(|| self::provenance(host, work, settings.words())),
         );
         let mut analysis = analysis.map_err(|error| WorkflowError::Nothing(error.to_string()))?;
+        outcome::refuse_level(&analysis)?;
+        if settings.combine {
+            analysis = with_others(host, work, settings, reference.as_ref(), analysis);
+        }
         progress.finish();
         analysis.warnings.extend(work.absent.iter().cloned().map(Warning::Failed));
         analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
@@ -125,13 +133,50 @@ impl<'a> Analysing<'a> {
     }
 }
 
-/// What the analysis gets of each flight.
-fn inputs(work: &Work, without: Uncorrected) -> Vec<FlightInput<'_>> {
-    let input = |flight| input(work, flight, without);
-    work.flights.iter().map(input).collect()
+/// An analysis with the maps of all indicators together; an indicator that the logs lack is told.
+fn with_others(
+    host: &dyn Host,
+    work: &Work,
+    settings: &Settings,
+    reference: Option<&FlightAnalysis>,
+    analysis: Analysis,
+) -> Analysis {
+    let mut all = vec![analysis];
+    for indicator in [Indicator::RotorSpeed, Indicator::Power] {
+        let tables = lean_tables(work, indicator);
+        let inputs = inputs(work, &tables, settings.without);
+        let options = AnalysisOptions { indicator, ..settings.options.clone() };
+        // Laws that are held are of one indicator.
+        let reference = reference.filter(|held| held.indicator == indicator);
+        match analyze(&work.title, &inputs, &options, reference, &|_, _| {}) {
+            Ok(other) => all.push(other),
+            Err(error) => {
+                host.warn(&format!("the map is made without {}: {error}", indicator.words()));
+            }
+        }
+    }
+    combine::add(&mut all);
+    all.swap_remove(0)
 }
 
-fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightInput<'a> {
+/// What the analysis gets of each flight.
+fn inputs<'a>(
+    work: &'a Work,
+    tables: &'a [Option<LeanTable>],
+    without: Uncorrected,
+) -> Vec<FlightInput<'a>> {
+    let input = |(flight, table): (&'a Found, &'a Option<LeanTable>)| {
+        input(work, flight, table.as_ref(), without)
+    };
+    work.flights.iter().zip(tables).map(input).collect()
+}
+
+fn input<'a>(
+    work: &'a Work,
+    flight: &'a Found,
+    table: Option<&'a LeanTable>,
+    without: Uncorrected,
+) -> FlightInput<'a> {
     FlightInput {
         name: &flight.name,
         plan: flight.plan.as_ref(),
@@ -146,6 +191,8 @@ fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightI
         sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
         true_air: flight.true_air.as_ref(),
         wind_forms: flight.wind_forms.as_ref().filter(|_| !without.wind),
+        lean_table: table.filter(|_| !without.wind),
+        level: flight.level.as_ref(),
         folder: Some(&work.root),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::analysis::Cause;
 use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
 use crate::analysis::together::{Remark, together};
 use crate::base::sentence::Sentence;
@@ -24,6 +25,23 @@ pub(crate) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
     };
     let flights = analysis.flights.iter().flat_map(of_flight);
     analysis.warnings.iter().map(ToString::to_string).chain(flights).collect()
+}
+
+/// Refuses a zero that no hover has, or a level that nothing gives: they were asked for.
+///
+/// # Errors
+///
+/// With what to give instead.
+pub(crate) fn refuse_level(analysis: &Analysis) -> Result<(), WorkflowError> {
+    let measures = || analysis.flights.iter().filter(|one| one.purpose == Purpose::Measurement);
+    if measures().any(|flight| flight.results() > 0) {
+        return Ok(());
+    }
+    let asked = |cause: &Cause| {
+        matches!(cause, Cause::ZeroOutside { .. } | Cause::NoResponse | Cause::NoLevel)
+    };
+    let refused = measures().flat_map(|flight| &flight.unmeasured).find(|one| asked(&one.reason));
+    refused.map_or(Ok(()), |one| Err(WorkflowError::Usage(format!("{}: {}", one.name, one.reason))))
 }
 
 /// Drones and logs of a flight that gave nothing, or not everything.

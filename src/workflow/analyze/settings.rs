@@ -11,6 +11,8 @@ pub struct Settings {
     pub options: AnalysisOptions,
     /// Corrections of the map that are left out.
     pub without: Uncorrected,
+    /// Whether the map is also made of the other indicators that the logs hold, and of all together.
+    pub combine: bool,
 }
 
 /// Corrections of the map that are left out.
@@ -27,7 +29,7 @@ pub struct Uncorrected {
 impl Settings {
     /// How it was analysed, for the report: (what, how).
     pub(super) fn words(&self) -> Vec<(&'static str, String)> {
-        let Self { options, without } = self;
+        let Self { options, without, .. } = self;
         let law = match options.map_law {
             None => "auto",
             Some(LawKind::Linear) => "linear",
@@ -38,6 +40,7 @@ impl Settings {
             Tilt::Paper => "paper",
         };
         let effort = match options.indicator {
+            _ if self.combine => "pulse, and with all others together",
             Indicator::Pulse => "pulse",
             Indicator::RotorSpeed => "rpm",
             Indicator::Power => "power",

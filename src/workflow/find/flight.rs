@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::files::logs_in;
-use super::leaning::leaning;
+use super::leaning::{leaning, leans_by_rotors};
 use super::of_start;
 use super::physics::{density, linear_thrust, sag};
 use super::true_scales::true_scales;
@@ -17,7 +17,6 @@ use crate::base::plain::Shown as _;
 use crate::campaign::origin::{LogOrigin, LogsAt};
 use crate::campaign::{FlightFolder, FlightRecord, LogRecord};
 use crate::mission::Plan;
-use crate::mission::plan::Purpose;
 use crate::sim::air::truth::{self, TrueUpdraft};
 use crate::vehicle::library;
 use crate::workflow::error::WorkflowError;
@@ -68,10 +67,11 @@ pub(super) fn found_flight(
         sag: sag(flown.is_some(), vehicle.as_ref()),
         wind_forms: vehicle
             .as_ref()
-            .filter(|_| plan.purpose == Purpose::Measurement)
             .and_then(|vehicle| wind_forms(plan.site.ground_amsl_m, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
+        level: None,
+        response_of: vehicle.clone().filter(leans_by_rotors),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),

@@ -5,6 +5,7 @@ mod flight;
 mod leaning;
 mod of_start;
 mod physics;
+mod response;
 mod true_scales;
 pub(crate) mod twice;
 
@@ -20,10 +21,11 @@ use super::error::WorkflowError;
 use super::hashes::Hashes;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
+use crate::analysis::lean_table::LeanTable;
 use crate::analysis::statistics::result::TrueAir;
 use crate::analysis::wind::Leaning;
 use crate::analysis::wind_forms::WindForms;
-use crate::analysis::{LogInput, TruthSeries};
+use crate::analysis::{Level, LogInput, TruthSeries};
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
@@ -35,6 +37,7 @@ use crate::flight::table::{Mapping, TableError};
 use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
+use crate::vehicle::{Vehicle, library};
 
 /// A flight found behind a path: its logs, and what is known of it. Without a plan and a record
 /// most of it is `None`.
@@ -66,6 +69,10 @@ pub struct Found {
     pub sag: Option<Sag>,
     /// Effect of wind on the pulse of a leaning drone, if known.
     pub wind_forms: Option<WindForms>,
+    /// Response of the vehicle whose level the flight gives, if that was asked for.
+    pub level: Option<Level>,
+    /// Vehicle whose response says what wind does to other indicators than the pulse, if it is known.
+    pub response_of: Option<Vehicle>,
     /// Scales of the simulated air, if there is any.
     pub true_air: Option<TrueAir>,
     /// Doubts about the files, one sentence each.
@@ -206,6 +213,49 @@ pub fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, WorkflowEr
         }
     }));
     Ok(shared.indicator)
+}
+
+/// What wind does to an indicator by the lean, for each flight of the work; `None` where the vehicle does not say, and
+/// for the pulse, of which the flights have [`Found::wind_forms`].
+pub(crate) fn lean_tables(work: &Work, indicator: Indicator) -> Vec<Option<LeanTable>> {
+    let of = |flight: &Found| {
+        let vehicle = flight.response_of.as_ref().filter(|_| indicator != Indicator::Pulse)?;
+        let response = response::response(vehicle, indicator).ok()?;
+        Some(leaning::lean_table_of(&response, indicator))
+    };
+    work.flights.iter().map(of).collect()
+}
+
+/// Wish for maps from a vehicle's response whose level the flights of a mapping give.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LevelWish {
+    /// Vehicle: a built-in name or a file; `None`: the slope of the calibration's line.
+    pub vehicle: Option<String>,
+    /// Stretch of the hover that sets the zero, from and to, s of the table; `None`: the calibration's windows do.
+    pub zero_s: Option<[f64; 2]>,
+}
+
+/// Gives the flights of tables the response and the level that are wished for.
+///
+/// # Errors
+///
+/// If the vehicle is unknown, or cannot hover in its own model.
+pub fn level_tables(
+    wish: &LevelWish,
+    indicator: Indicator,
+    work: &mut Work,
+) -> Result<(), WorkflowError> {
+    let vehicle = wish.vehicle.as_deref().map(library::load).transpose()?;
+    let response = vehicle.map(|vehicle| response::response(&vehicle, indicator)).transpose()?;
+    for flight in &mut work.flights {
+        let mapping = flight.logs.first().and_then(|log| log.table.as_ref());
+        flight.level = Some(Level {
+            response: response.clone(),
+            zero_s: wish.zero_s,
+            distance_m: mapping.and_then(|mapping| mapping.truth_distance_m),
+        });
+    }
+    Ok(())
 }
 
 /// Which logs are taken, where there are any.

@@ -14,6 +14,8 @@ pub(super) fn true_scales(components: &[String]) -> Option<TrueAir> {
         lambda_y_m: spec.given("lambda_y").unwrap_or_else(|| spec.value("lambda")),
         tau_s: spec.value("tau"),
         wind_mps: spec.given("wind").unwrap_or(0.0),
+        is_gaussian: false,
+        drift_mps: None,
     });
     let field = fields.next();
     if fields.next().is_some() {
@@ -26,6 +28,7 @@ pub(super) fn true_scales(components: &[String]) -> Option<TrueAir> {
                 spectrum: spectrum.to_owned(),
                 sd_mps: spec.value("sd"),
                 length_m: spec.value("length"),
+                time_s: None,
             })
         })
         .collect();

@@ -159,6 +159,59 @@ fn a_reference_calibration_holds_a_and_u0() {
 }
 
 #[test]
+fn the_calibrations_own_curve_is_held_whatever_its_law() {
+    // The firmware flown in its own simulator, whose rotors are neither of the paper's laws.
+    let still_paths = [fixture("ladder-still.trimmed.BIN")];
+    let still = run(None, &still_paths, &AnalysisOptions::default());
+    let held = |path: &str, reference: &FlightAnalysis, options: &AnalysisOptions| {
+        let logs = logs(&[fixture(path)]);
+        let input = input("again", None, &logs);
+        analyze_flight(&input, options, Some(reference), &|_, _| {}).unwrap()
+    };
+    let options = AnalysisOptions::default();
+    let flight = held("ladder-updraft.trimmed.BIN", &still, &options);
+    let laws = flight.drones[0].laws.as_ref().unwrap();
+    let curve = laws.held.as_ref().unwrap();
+    let (w, [low, high]) = (curve.updraft.unwrap(), curve.interval_mps.unwrap());
+    assert!((w.value - 1.0).abs() < 0.03 && low < 1.0 && 1.0 < high, "{curve:?}");
+    assert!(high - low < 0.1 && w.se > 0.003, "{curve:?}");
+    assert_eq!(curve.beyond, 2, "the two fastest descents go beyond the calibration");
+    assert!(curve.doubt.as_ref().unwrap().contains("2 of 14 legs"), "{curve:?}");
+    // What the signed quadratic says of it: half, with a small error.
+    let square = laws.signed_quadratic_held.as_ref().unwrap().value(Symbol::W).unwrap();
+    assert!((square - 0.54).abs() < 0.02, "{square}");
+    let row = flight.table.iter().find(|row| row.law == TableLaw::CurveHeld).unwrap();
+    assert_eq!((row.mean, row.n), (w.value, 1));
+    // The other way round, and against itself.
+    let back = held("ladder-still.trimmed.BIN", &flight, &options);
+    let w = back.flock.unwrap().held.unwrap().updraft.unwrap();
+    assert!((w.value + 1.0).abs() < 0.03, "{w}");
+    let same = held("ladder-still.trimmed.BIN", &still, &options);
+    let w = same.flock.unwrap().held.unwrap().updraft.unwrap();
+    assert!(w.value.abs() < 1e-3, "{w}");
+    let plain = AnalysisOptions { plain: true, ..AnalysisOptions::default() };
+    let plain = held("ladder-updraft.trimmed.BIN", &still, &plain);
+    assert!(plain.flock.unwrap().held.is_none() && plain.headline.is_none());
+}
+
+#[test]
+fn the_law_that_the_windows_prefer_is_the_headline() {
+    let of = |name: &str| run(None, &[fixture(name)], &AnalysisOptions::default());
+    let bent = of("ladder-still.trimmed.BIN");
+    let headline = bent.headline.as_ref().unwrap();
+    let line = headline.line.unwrap();
+    assert_eq!(headline.law, LawKind::Linear);
+    assert!(line.is_bent(), "{line:?}");
+    // Of the windows around hover: 1595.19 us at +0.5 and 1587.41 us at -0.5 m/s, less 0.15 us by 4.5 m of height.
+    assert!((line.slope.value - 7.6).abs() < 0.6, "{line:?}");
+    assert!(line.slope_at(3.5) > 15.0 && line.slope_at(-3.5) > 10.0, "{line:?}");
+    assert!(bent.drones[0].line.is_some());
+    let square = of("square-law-ladder.trimmed.BIN");
+    assert_eq!(square.headline.unwrap().law, LawKind::SignedQuadratic);
+    assert!(square.drones[0].line.is_none());
+}
+
+#[test]
 fn a_log_cut_in_flight_keeps_its_whole_windows() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("1.BIN");

@@ -63,6 +63,11 @@ fn a_linear_truth_reproduces_the_papers_table_ii() {
         u0.0.push(quadratic.parameters[1].estimate.value);
         w.0.push(quadratic.parameters[2].estimate.value);
         far += u32::from(quadratic.parameters[2].estimate.value.abs() > 3.0);
+        let said =
+            quadratic.warnings.iter().any(|one| one.to_string().contains("no minimum inside"));
+        let edge = said.then_some(quadratic.parameters[2].estimate.value);
+        assert_eq!(quadratic.w_beyond_mps, edge, "an edge is marked, and nothing else is");
+        assert!(edge.is_none_or(|edge| edge.abs() == 8.0), "{edge:?}");
         nu.0.push(quadratic.chi2_reduced.unwrap());
         slope.0.push(line.parameters[0].estimate.value);
         hover.0.push(line.parameters[1].estimate.value);

@@ -29,6 +29,7 @@ mod gap_next;
 mod gap_nothing;
 mod guided;
 mod help;
+mod indicators;
 mod inspect;
 mod lock;
 mod logs;
@@ -36,6 +37,7 @@ mod logs_import;
 #[cfg(unix)]
 mod logs_pull;
 mod manners;
+mod masts;
 mod orders;
 mod physics;
 mod plan;

@@ -112,6 +112,25 @@ fn nothing_found_is_said_plainly() {
 }
 
 #[test]
+fn a_w_at_its_bound_is_no_number() {
+    let mut analysis = campaign();
+    let flight = &mut analysis.flights[0];
+    let laws = flight.drones.iter_mut().filter_map(|drone| drone.laws.as_mut());
+    for laws in laws.chain(flight.flock.as_mut()) {
+        let fit = laws.signed_quadratic.as_mut().unwrap();
+        fit.parameters[2].estimate.value = -7.987;
+        fit.w_beyond_mps = Some(-8.0);
+    }
+    let text = terminal_summary(&analysis, 200, false);
+    let page = render(&analysis, &provenance()).unwrap().html;
+    for said in [&text, &page] {
+        assert!(said.contains("below −8"), "{said}");
+        assert!(!said.contains("7.987"), "{said}");
+    }
+    assert!(text.contains("A and u₀ not determined"), "{text}");
+}
+
+#[test]
 fn the_better_law_is_the_headline() {
     let tile = |analysis: &Analysis, label: &str| {
         render(analysis, &provenance()).unwrap().html.contains(&format!("\"label\">{label}"))

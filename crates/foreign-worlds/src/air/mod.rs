@@ -2,9 +2,11 @@
 
 mod field;
 mod shear;
+mod thermal;
 
 pub use field::{Field, FieldSettings};
 pub use shear::{REFERENCE_M, Shear};
+pub use thermal::{Profile, ThermalSettings};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,6 +35,9 @@ pub struct AirSettings {
     pub own_s: f64,
     /// A field of the updraft in space, if there is one.
     pub field: Option<FieldSettings>,
+    /// A thermal, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thermal: Option<ThermalSettings>,
     /// Mean horizontal wind at the reference height, show frame x and y, m/s.
     pub wind_mps: [f64; 2],
     /// How the wind grows with height.
@@ -125,8 +130,11 @@ impl Around<'_> {
                 value
             }
         };
-        let up =
-            settings.updraft_mps + self.air.shared.at(time_s) + self.own.at(time_s) + field_mps;
+        let [x, y, _] = position_m;
+        let thermal_mps =
+            settings.thermal.map_or(0.0, |thermal| thermal.updraft_mps([x, y], time_s));
+        let shared_mps = settings.updraft_mps + self.air.shared.at(time_s);
+        let up = shared_mps + self.own.at(time_s) + field_mps + thermal_mps;
         [horizontal[0], horizontal[1], up]
     }
 }
@@ -148,6 +156,7 @@ mod tests {
                 time_s: 60.0,
                 is_advected: true,
             }),
+            thermal: None,
             wind_mps: [3.0, -4.0],
             shear: Shear::Power { exponent: 0.2 },
             gust_share: 0.15,

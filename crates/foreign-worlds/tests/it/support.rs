@@ -50,6 +50,7 @@ pub(crate) fn quiet(plant: &Plant) -> World {
             own_mps: 0.0,
             own_s: 8.0,
             field: None,
+            thermal: None,
             wind_mps: [0.0; 2],
             shear: Shear::None,
             gust_share: 0.0,

@@ -146,6 +146,10 @@ pub struct Autopilot {
     /// MOT_BAT_VOLT_MIN, V: below it the compensation grows no more.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub mot_bat_volt_min: f64,
+    /// Whether the motor controllers report their speed (bidirectional DShot): simulated logs then
+    /// have it as ESC rows.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub esc_telemetry: bool,
 }
 
 /// Left out of files, as serde asks for it: by reference.

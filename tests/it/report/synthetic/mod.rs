@@ -128,6 +128,7 @@ pub(crate) fn calibration(
         ])),
         signed_quadratic_held: None,
         sigma_added_us: Some(0.42),
+        held: None,
         linear: Some(straight(23.1, U0 - 0.4)),
     };
     let table = table(&analysed);
@@ -152,6 +153,7 @@ pub(crate) fn calibration(
             })
             .collect(),
         flock: (drones > 1).then_some(flock),
+        headline: None,
         table: if drones > 1 { table } else { Vec::new() },
         map: None,
         unmeasured: Vec::new(),
@@ -262,10 +264,12 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         },
         windows,
         offset: None,
+        line: None,
         laws: Some(Laws {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
             sigma_added_us: Some(0.0),
+            held: None,
             linear: Some(straight(slope, u0)),
         }),
         partial_ladder: None,
@@ -314,6 +318,7 @@ pub(crate) fn fit(parameters: &[(Symbol, f64, f64)]) -> Fit {
         rms_us: 0.61,
         other_minima: Vec::new(),
         warnings: Vec::new(),
+        w_beyond_mps: None,
     }
 }
 
@@ -428,6 +433,9 @@ pub(crate) fn hover() -> FlightAnalysis {
             updraft_mps: updraft,
             sd_mps: Vec::new(),
             interval_mps: Vec::new(),
+            posterior_mps: Vec::new(),
+            posterior_sd_mps: Vec::new(),
+            posterior_mean: None,
             quality: Vec::new(),
             truth_mps: Some(truth),
         }));
@@ -440,6 +448,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             windows: Vec::new(),
             offset: None,
             laws: None,
+            line: None,
             partial_ladder: None,
             trace: Trace::default(),
             warnings: if slot == 20 {
@@ -470,6 +479,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             })
             .collect(),
         flock: None,
+        headline: None,
         table: Vec::new(),
         unmeasured: vec![Unmeasured {
             slot: Some(44),
@@ -494,6 +504,10 @@ pub(crate) fn hover() -> FlightAnalysis {
             calibration_air: None,
             common: None,
             truth: None,
+            levelled: None,
+            combined: None,
+            posterior: None,
+            thermals: Vec::new(),
         }),
     }
 }

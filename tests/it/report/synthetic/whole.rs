@@ -75,6 +75,8 @@ pub(crate) fn whole_campaign() -> Analysis {
         rms_without_bias_mps: 0.095,
         inside_share: 0.953,
         means_inside_share: 0.976,
+        limit_rms_mps: None,
+        at_limit_rms_mps: None,
     });
     analysis
 }
@@ -170,6 +172,7 @@ fn statistics() -> FieldStatistics {
             words: "2.4 ± 0.2 m/s from 240°.".to_owned(),
             ..TiltWind::default()
         }),
+        baseline: None,
         averaging: Some(Averaging {
             averaging_s: vec![1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0],
             median_mps: vec![0.04, 0.06, 0.1, 0.15, 0.17, 0.14, 0.11, 0.12],
@@ -180,7 +183,7 @@ fn statistics() -> FieldStatistics {
             smoothed_below_s: 10.0,
             best: Some(Reached { deviation_mps: 0.11, averaging_s: 100.0 }),
             reached: Vec::new(),
-            words: "A baseline of 100 s repeats best.".to_owned(),
+            words: "Averages of 100 s repeat best.".to_owned(),
         }),
         true_air: None,
         absent: vec!["Nothing was left out but this sentence.".to_owned()],

@@ -15,6 +15,29 @@ use super::Moment;
 use super::battery::Battery;
 use super::view::{Euler, View, frd};
 
+/// ESC: the speed that each motor's controller reports, in whole rev/min as it comes over the wire, and its share of the
+/// battery's current.
+pub(super) fn write_speeds<W: Write>(
+    log: &mut LogWriter<W>,
+    moment: &Moment<'_>,
+    battery: &Battery,
+    board_us: i64,
+) -> io::Result<u64> {
+    let speeds = moment.plant.rotors().speeds_radps();
+    let (volts, amps) = (battery.volts(), battery.current_a / speeds.len() as f64);
+    let mut rows = 0;
+    for (instance, speed_radps) in (0..).zip(speeds) {
+        let rpm = F((speed_radps * 60.0 / std::f64::consts::TAU).round());
+        let none = F(0.0);
+        log.row(
+            &catalog::ESC,
+            &[I(board_us), I(instance), rpm, rpm, F(volts), F(amps), none, none, none, none],
+        )?;
+        rows += 1;
+    }
+    Ok(rows)
+}
+
 /// ATT, CTUN, BAT, RCOU, MOTB and, while the controllers run, PSCN/E/D: the 10 Hz rows.
 pub(super) fn write<W: Write>(
     log: &mut LogWriter<W>,

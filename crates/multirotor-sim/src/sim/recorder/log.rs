@@ -28,6 +28,7 @@ pub struct LogRecorder<'a, W: Write> {
     lights: Lights<'a>,
     full: Option<Full>,
     has_show: bool,
+    has_speeds: bool,
     rows: u64,
 }
 
@@ -45,11 +46,8 @@ impl<'a, W: Write> LogRecorder<'a, W> {
         let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start, booted);
         let view = View::new(&setup.frame, setup.home_m);
         let board_us = clock.board_us(armed_us);
-        let mut log = LogWriter::with_time(
-            out,
-            &messages(setup.full_logs, is_guided),
-            board_us.max(0) as u64,
-        )?;
+        let mut log =
+            LogWriter::with_time(out, &messages(setup, is_guided), board_us.max(0) as u64)?;
         let rows = start::write(&mut log, setup, &view, board_us, is_guided)?;
         Ok(Self {
             log,
@@ -60,6 +58,7 @@ impl<'a, W: Write> LogRecorder<'a, W> {
             lights: Lights::new(setup.lights),
             full: setup.full_logs.then(|| Full::new(setup, &view)),
             has_show: !is_guided,
+            has_speeds: setup.vehicle.autopilot.esc_telemetry,
             rows,
         })
     }
@@ -72,14 +71,17 @@ impl<'a, W: Write> LogRecorder<'a, W> {
 }
 
 /// The messages of the log.
-fn messages(full: bool, is_guided: bool) -> Vec<&'static MessageDef> {
-    let mut messages = if full {
+fn messages(setup: &FlightSetup<'_>, is_guided: bool) -> Vec<&'static MessageDef> {
+    let mut messages = if setup.full_logs {
         catalog::FULL_SET.to_vec()
     } else {
         let mut messages = catalog::DEFAULT_SET.to_vec();
         messages.push(&catalog::GUIP);
         messages
     };
+    if setup.vehicle.autopilot.esc_telemetry {
+        messages.push(&catalog::ESC);
+    }
     messages.retain(|message| !(is_guided && message.name == catalog::SHOW.name));
     messages
 }
@@ -107,6 +109,9 @@ impl<W: Write> Recorder for LogRecorder<'_, W> {
             self.rows +=
                 control::write(log, moment, &self.view, &attitude, &self.battery, board_us)?;
             self.rows += navigation::write(log, moment, &self.view, &attitude, board_us)?;
+            if self.has_speeds {
+                self.rows += control::write_speeds(log, moment, &self.battery, board_us)?;
+            }
         }
         if let Some(full) = &mut self.full {
             self.rows += full.write(log, moment, &self.view, board_us)?;

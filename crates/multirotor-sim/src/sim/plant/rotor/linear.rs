@@ -59,6 +59,11 @@ impl Linear {
         self.max_thrust_n
     }
 
+    /// Present speed of each rotor, rad/s.
+    pub fn speeds_radps(&self) -> [f64; ROTORS] {
+        self.output.map(|output| self.speed_radps(output))
+    }
+
     /// Sum of the rotors' present outputs, 0..4, as shares of full thrust.
     #[inline]
     pub fn total_output(&self) -> f64 {

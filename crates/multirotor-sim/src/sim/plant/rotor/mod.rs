@@ -52,6 +52,14 @@ impl Rotors {
         }
     }
 
+    /// Present speed of each rotor, rad/s.
+    pub fn speeds_radps(&self) -> [f64; ROTORS] {
+        match self {
+            Self::Linear(rotors) => rotors.speeds_radps(),
+            Self::Motor(rotors) => rotors.speeds_radps(),
+        }
+    }
+
     /// Sum of the rotors' present outputs, 0..4, as shares of full thrust.
     pub fn total_output(&self) -> f64 {
         match self {

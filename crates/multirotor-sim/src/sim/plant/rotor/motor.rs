@@ -57,6 +57,11 @@ impl Motor {
         self.thrust_factor * self.max_square
     }
 
+    /// Present speed of each rotor, rad/s.
+    pub fn speeds_radps(&self) -> [f64; ROTORS] {
+        self.speed_radps
+    }
+
     /// Sum of the rotors' squared speeds as shares of the largest, 0 to 4.
     pub fn total_output(&self) -> f64 {
         self.squares().iter().sum::<f64>() / self.max_square

@@ -1,0 +1,105 @@
+//! Covariance of means over 10 s of drones that move: each is a mean along a part of its track.
+
+use super::covariance::Covariance;
+use crate::analysis::running::RUNNING_S;
+
+/// Drones whose velocities differ by less fly side by side, m/s: 1 m within a window.
+const SIDE_BY_SIDE_MPS: f64 = 0.1;
+/// Nodes of the mean over the difference of two times within windows (a triangular density) as shares of the window,
+/// with their weights: Gauss's on each side of zero, where the covariance of a rough field has its edge.
+const SIDES: [(f64, f64); 6] = [
+    (0.088_587_96, 0.200_931_915),
+    (-0.088_587_96, 0.200_931_915),
+    (0.409_466_86, 0.229_241_105),
+    (-0.409_466_86, 0.229_241_105),
+    (0.787_659_46, 0.069_826_98),
+    (-0.787_659_46, 0.069_826_98),
+];
+/// Gauss's nodes of the mean over a window as shares of its length, with their weights.
+const WINDOW: [(f64, f64); 3] =
+    [(0.0, 4.0 / 9.0), (0.387_298_335, 5.0 / 18.0), (-0.387_298_335, 5.0 / 18.0)];
+
+/// Covariance of the field's means over two windows whose middles are so far apart, of drones with these
+/// velocities, (m/s)².
+pub(super) fn along(
+    covariance: &Covariance,
+    apart_m: [f64; 3],
+    apart_s: f64,
+    [one_mps, other_mps]: [[f64; 3]; 2],
+) -> f64 {
+    let moved = |one_s: f64, other_s: f64| {
+        let apart_m =
+            [0, 1, 2].map(|axis| apart_m[axis] + one_mps[axis] * one_s - other_mps[axis] * other_s);
+        covariance.instant(apart_m, apart_s + one_s - other_s)
+    };
+    let is_beside = (0..3).all(|axis| (one_mps[axis] - other_mps[axis]).abs() < SIDE_BY_SIDE_MPS);
+    if is_beside {
+        // Only the difference of the two times counts.
+        return SIDES.iter().map(|(at, weight)| weight * moved(at * RUNNING_S, 0.0)).sum();
+    }
+    let mut sum = 0.0;
+    for (one, one_weight) in WINDOW {
+        for (other, other_weight) in WINDOW {
+            sum += one_weight * other_weight * moved(one * RUNNING_S, other * RUNNING_S);
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::kriging::covariance::{Air, Form};
+
+    fn covariance(form: Form, drift_mps: [f64; 2]) -> Covariance {
+        Covariance::new(Air {
+            form,
+            sd_mps: 0.5,
+            length_m: 60.0,
+            stretch: [0.0; 2],
+            time_s: 100.0,
+            drift_mps,
+            gust_mps: 0.0,
+            gust_s: 4.0,
+        })
+    }
+
+    #[test]
+    fn means_along_tracks_have_the_covariance_that_sums_say() {
+        let east = [4.0, 0.0, 0.0];
+        for form in [Form::Exponential, Form::Gaussian] {
+            for drift_mps in [[0.0; 2], [1.5, -0.5]] {
+                let covariance = covariance(form, drift_mps);
+                for (apart_m, apart_s, velocities) in [
+                    ([0.0; 3], 0.0, [east, east]),
+                    ([0.0, 10.0, 0.0], 0.0, [east, east]),
+                    ([-40.0, 0.0, 0.0], -10.0, [east, east]),
+                    ([15.0, 10.0, 20.0], 60.0, [east, [-4.0, 0.0, 0.0]]),
+                    ([30.0, 0.0, 0.0], 20.0, [east, [0.0; 3]]),
+                ] {
+                    let [one_mps, other_mps] = velocities;
+                    let steps = 80;
+                    let at =
+                        |step: i32| ((f64::from(step) + 0.5) / f64::from(steps) - 0.5) * RUNNING_S;
+                    let mut sum = 0.0;
+                    for one in 0..steps {
+                        for other in 0..steps {
+                            let moved = [0, 1, 2].map(|axis| {
+                                apart_m[axis] + one_mps[axis] * at(one)
+                                    - other_mps[axis] * at(other)
+                            });
+                            sum += covariance.instant(moved, apart_s + at(one) - at(other));
+                        }
+                    }
+                    let expected = sum / f64::from(steps * steps);
+                    let found = along(&covariance, apart_m, apart_s, velocities);
+                    // Of a variance of 0.25.
+                    assert!(
+                        (found - expected).abs() < 2.5e-3,
+                        "{form:?} {drift_mps:?} {apart_m:?}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Thermals as objects: columns of rising air that no stationary field explains.
+//!
+//! ```text
+//! y(i, t) = model of the map + sum of P g((x_i - c - d t) / R)
+//! ```
+//!
+//! with the shape `g` of [`shape`]. For air of given scales records are made white ([`whiten`]), and the most probable core
+//! `c`, drift `d`, radius and shape follow from the generalized least squares of each choice ([`fit`]); the scales are
+//! found again without the thermal. There are as many thermals as the evidence speaks for.
+
+mod fit;
+mod shape;
+mod whiten;
+
+#[cfg(test)]
+mod tests;
+
+use super::covariance::{Covariance, Form};
+use super::data::{Drone, Row, Rows, UNIFORM};
+use super::neighbours::{Neighbours, Reach, before};
+use super::scales::{Found, LN_GUST, LN_LENGTH, LN_SD, LN_TIME, Point, Search, log_prior};
+use crate::numeric::{differences, minimise};
+use fit::{Candidate, Fit, Region, record};
+use shape::{DRIFT, DRIFT_MPS, PLACE, PLACE_M, SINK, Shape};
+use whiten::Whitening;
+
+/// Thermals that are looked for, at most. Chosen.
+const MOST: usize = 4;
+/// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again. Neighbours
+/// stand for all values, and forms for the field's own: fields without a thermal reach 9 (docs/errors.md).
+const WORTH: f64 = 12.0;
+/// In the scales that were found without it, a thermal must come so near to being worth it, nats, to be followed.
+const WORTH_A_LOOK: f64 = -6.0;
+/// Rounds in which scales and thermal are found again.
+const ROUNDS: usize = 3;
+/// A field that may have been taken for a thermal's is tried so much weaker, too (logarithm).
+const QUIET: f64 = -1.2;
+/// A thermal that fewer drones meet is an error of theirs.
+const FEWEST_DRONES: usize = 3;
+/// Share of the peak from which on a drone meets it.
+const MET: f64 = 0.2;
+/// What a calibration leaves of the zero, and an updraft that is everywhere the same, m/s: with an open zero the tail of a
+/// wide thermal cannot be told from it. The standard error of calibrations in moving air (docs/errors.md).
+const ZERO_MPS: f64 = 0.3;
+/// Larger records are not searched: the time grows with the number of values and of drones.
+const MOST_VALUES: usize = 8000;
+/// See [`MOST_VALUES`].
+const MOST_DRONES: usize = 200;
+
+/// What is conditioned on: with fewer neighbours, a thermal explains some of what they miss of smooth fields (false finds in
+/// two of eight, with 16 neighbours).
+const REACH: Reach = Reach { beside: 14, step: 14, own: 4 };
+/// The same for drones that move, of whose values each has weights of its own.
+const REACH_OF_MOVING: Reach = Reach { beside: 10, step: 8, own: 3 };
+
+/// A value with its standard error.
+pub(in super::super) type Known = (f64, f64);
+
+/// A thermal.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Thermal {
+    /// When the core is at its place, s of the record: where that is known best.
+    pub(in super::super) at_s: f64,
+    /// The core, show frame, m.
+    pub(in super::super) core_m: [Known; 2],
+    /// Drift, m/s.
+    pub(in super::super) drift_mps: [Known; 2],
+    /// Distance from the core at which the updraft has fallen to 1/e of the peak, m.
+    pub(in super::super) radius_m: Known,
+    /// Updraft in the core over that of the air around, m/s.
+    pub(in super::super) peak_mps: Known,
+    /// Flux through the disc of that radius, m³/s.
+    pub(in super::super) flux_m3ps: Known,
+    /// How much sinks around it: 0 nothing, 1 as much as rises.
+    pub(in super::super) sink: Known,
+    /// Logarithm of the evidence for it over that for none.
+    pub(in super::super) log_odds: f64,
+}
+
+/// A record in which thermals are looked for.
+pub(super) struct Record<'a> {
+    /// What scales are found by.
+    pub(super) search: &'a Search<'a>,
+    pub(super) drones: &'a [Drone],
+    pub(super) found: &'a Found,
+    pub(super) wind_mps: Option<[f64; 2]>,
+}
+
+/// Scales of the air.
+type Scales = (Form, Point);
+
+/// A thermal with the scales of the air around it.
+struct Explained {
+    candidate: Candidate,
+    scales: Scales,
+    /// Logarithm of the evidence.
+    evidence: f64,
+}
+
+impl Record<'_> {
+    /// The thermals of a record, the most certain first.
+    pub(super) fn thermals(&self) -> Vec<Thermal> {
+        let rows = self.search.rows;
+        let too_large = rows.rows.len() > MOST_VALUES || self.search.own_mps.len() > MOST_DRONES;
+        let Some(region) = Region::of(rows, self.wind_mps).filter(|_| !too_large) else {
+            return Vec::new();
+        };
+        let mut search = *self.search;
+        search.factor[(UNIFORM, UNIFORM)] = ZERO_MPS;
+        let moves = self.drones.iter().any(|drone| !drone.hovers());
+        let reach = if moves { REACH_OF_MOVING } else { REACH };
+        let neighbours = before(self.drones, rows, reach);
+        let looked = Looked { search: &search, neighbours: &neighbours };
+        looked.thermals(&region, (self.found.form, self.found.best))
+    }
+}
+
+/// A record with what makes it white.
+struct Looked<'a> {
+    search: &'a Search<'a>,
+    neighbours: &'a Neighbours,
+}
+
+impl Looked<'_> {
+    fn thermals(&self, region: &Region, scales: Scales) -> Vec<Thermal> {
+        let mut found: Vec<(Candidate, f64)> = Vec::new();
+        let mut left = self.search.rows.clone();
+        // With the zero better known.
+        let mut scales = again(self.search, scales);
+        while found.len() < MOST {
+            let Some(none) = self.evidence(&left, &scales) else { break };
+            let Some(one) = self.one(&left, region, scales) else { break };
+            let odds = one.evidence - none;
+            if odds < WORTH {
+                break;
+            }
+            left = without(&left, &one.candidate);
+            scales = one.scales;
+            found.push((one.candidate, odds));
+        }
+        self.one_by_one(&mut found, region, scales);
+        found
+            .into_iter()
+            .map(|(candidate, log_odds)| thermal(&candidate.at_its_best(region), log_odds))
+            .collect()
+    }
+
+    fn whitening(&self, rows: &Rows, (form, point): &Scales) -> Option<Whitening<'_>> {
+        let covariance = Covariance::new(self.search.air(*form, point));
+        let Search { factor, own_mps, .. } = self.search;
+        Whitening::new(rows, self.neighbours, &covariance, factor, own_mps)
+    }
+
+    /// Logarithm of the evidence for no thermal.
+    fn evidence(&self, rows: &Rows, scales: &Scales) -> Option<f64> {
+        let whitening = self.whitening(rows, scales)?;
+        Some(whitening.log_density(&whitening.white(&values(rows))) + log_prior(&scales.1))
+    }
+
+    /// The most probable thermal, with the scales of the air around it; `None` where nothing looks like one.
+    fn one(&self, rows: &Rows, region: &Region, scales: Scales) -> Option<Explained> {
+        let look = |scales: &Scales| {
+            let whitening = self.whitening(rows, scales)?;
+            let values = whitening.white(&values(rows));
+            Fit { rows, region, whitening: &whitening, values }.best()
+        };
+        let first = look(&scales)?;
+        let mut quiet = scales;
+        quiet.1[LN_SD] += QUIET;
+        let second = look(&quiet)?;
+        if first.log_odds < WORTH_A_LOOK || second.log_odds < WORTH {
+            return None;
+        }
+        let starts = [first, second].into_iter().filter(|start| is_met(rows, start));
+        starts
+            .filter_map(|start| self.refined(rows, region, start, scales))
+            .filter(|one| is_met(rows, &one.candidate))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    }
+
+    /// A thermal and the scales of the air around it, each found again with the other.
+    fn refined(
+        &self,
+        rows: &Rows,
+        region: &Region,
+        start: Candidate,
+        scales: Scales,
+    ) -> Option<Explained> {
+        let mut at = Explained { candidate: start, scales, evidence: f64::NEG_INFINITY };
+        for _ in 0..ROUNDS {
+            let left = without(rows, &at.candidate);
+            let search = Search { rows: &left, ..*self.search };
+            let scales = again(&search, at.scales);
+            let point = scales.1;
+            let whitening = self.whitening(rows, &scales)?;
+            let white = whitening.white(&values(rows));
+            let without = whitening.log_density(&white) + log_prior(&point);
+            let fit = Fit { rows, region, whitening: &whitening, values: white };
+            let candidate = fit.from(&[(at.candidate.numbers, at.candidate.at_s)])?;
+            let evidence = without + candidate.log_odds;
+            let gained = evidence - at.evidence;
+            if gained < 0.0 {
+                break;
+            }
+            at = Explained { candidate, scales, evidence };
+            if gained < 0.1 {
+                break;
+            }
+        }
+        at.evidence.is_finite().then_some(at)
+    }
+
+    /// Finds each of several thermals again without the others.
+    fn one_by_one(&self, found: &mut [(Candidate, f64)], region: &Region, scales: Scales) {
+        if found.len() < 2 {
+            return;
+        }
+        for index in 0..found.len() {
+            let mut left = self.search.rows.clone();
+            for (other, (candidate, _)) in found.iter().enumerate() {
+                if other != index {
+                    left = without(&left, candidate);
+                }
+            }
+            let Some(whitening) = self.whitening(&left, &scales) else { return };
+            let white = whitening.white(&values(&left));
+            let fit = Fit { rows: &left, region, whitening: &whitening, values: white };
+            let start = (found[index].0.numbers, found[index].0.at_s);
+            if let Some(candidate) = fit.from(&[start]) {
+                found[index].0 = candidate;
+            }
+        }
+    }
+}
+
+/// Scales that are found again with a thermal: the others hardly hang on it.
+const AGAIN: [usize; 4] = [LN_SD, LN_LENGTH, LN_TIME, LN_GUST];
+
+/// The most probable scales of a record, from those of another one.
+fn again(search: &Search<'_>, (form, start): Scales) -> Scales {
+    let of = |some: &[f64; 4]| {
+        let mut point = start;
+        AGAIN.iter().zip(some).for_each(|(index, value)| point[*index] = *value);
+        point
+    };
+    let loss = |some: &[f64; 4]| -search.log_posterior(form, &of(some));
+    let first = AGAIN.map(|index| start[index]);
+    let (best, least) = minimise(first, loss, |at, value| differences(loss, at, value));
+    (form, if least.is_finite() { of(&best) } else { start })
+}
+
+fn values(rows: &Rows) -> Vec<f64> {
+    rows.rows.iter().map(|row| row.value_mps).collect()
+}
+
+/// Rows less a thermal.
+fn without(rows: &Rows, candidate: &Candidate) -> Rows {
+    let record = record(rows, &candidate.numbers, candidate.at_s);
+    let own = rows
+        .rows
+        .iter()
+        .zip(record)
+        .map(|(row, share)| Row { value_mps: row.value_mps - candidate.peak_mps * share, ..*row });
+    Rows { rows: own.collect(), ..rows.clone() }
+}
+
+/// Whether enough drones meet a thermal.
+fn is_met(rows: &Rows, candidate: &Candidate) -> bool {
+    let record = record(rows, &candidate.numbers, candidate.at_s);
+    let met = rows.rows.iter().zip(record).filter(|(_, share)| *share > MET);
+    let drones: std::collections::BTreeSet<Option<usize>> =
+        met.map(|(row, _)| row.spot.drone).collect();
+    drones.len() >= FEWEST_DRONES
+}
+
+fn thermal(candidate: &Candidate, log_odds: f64) -> Thermal {
+    let at_s = candidate.at_s;
+    Thermal {
+        at_s,
+        core_m: PLACE.map(|index| candidate.derived(|numbers, _| PLACE_M * numbers[index])),
+        drift_mps: DRIFT.map(|index| candidate.derived(|numbers, _| DRIFT_MPS * numbers[index])),
+        radius_m: candidate.derived(|numbers, _| Shape::new(numbers, at_s).core_radius_m()),
+        peak_mps: candidate.derived(|_, peak_mps| peak_mps),
+        flux_m3ps: candidate
+            .derived(|numbers, peak_mps| peak_mps * Shape::new(numbers, at_s).core_flux_m3ps()),
+        sink: candidate.derived(|numbers, _| numbers[SINK]),
+        log_odds,
+    }
+}
