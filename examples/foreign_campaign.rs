@@ -119,7 +119,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Air of a kind in the first (calibration) or second flight.
 fn air(kind: &str, flight: usize) -> Option<AirSettings> {
     let field = |sd_mps, length_m, time_s, is_advected| {
-        Some(FieldSettings { sd_mps, length_m, time_s, is_advected })
+        Some(FieldSettings { sd_mps, length_m, time_s, is_advected, waves: Some(200) })
     };
     let still = AirSettings {
         updraft_mps: 0.0,
@@ -138,9 +138,9 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
     };
     Some(match kind {
         "still" => still,
-        "field" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
+        // `noisy` has noise of the pulses besides.
+        "field" | "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "gusty" => AirSettings { field: field(0.5, 145.0, 186.0, false), own_mps: 0.25, ..still },
-        "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }

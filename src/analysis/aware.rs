@@ -268,7 +268,9 @@ impl<'a> Aware<'a> {
             let interval = values.interval(&one, values.level_us(&one, air_mps, half_us));
             let noise = values.interval(&one, values.level_us(&one, air_mps, NORMAL * noise_us));
             let mut doubts_us = one.doubts_us;
-            steady_us.iter().for_each(|(doubt, value)| doubts_us[*doubt] = *value);
+            for (doubt, value) in steady_us {
+                doubts_us[doubt] = value;
+            }
             let middle = values.error(&doubts_us, middle_mps, sigmas);
             let per_mps = values.steep(&one, middle_mps);
             measured.modelled.push(Some(Value {

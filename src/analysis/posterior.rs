@@ -189,7 +189,9 @@ fn share_law(drones: &mut [Drone]) {
         .collect();
     for value in drones.iter_mut().flat_map(|drone| drone.values.iter_mut().flatten()) {
         value.law = law;
-        steady.iter().for_each(|(doubt, mps)| value.doubts_mps[*doubt] = *mps);
+        for (doubt, mps) in steady {
+            value.doubts_mps[doubt] = mps;
+        }
     }
 }
 

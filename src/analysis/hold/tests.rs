@@ -126,7 +126,9 @@ fn averages_are_of_the_windows_that_all_drones_have() {
     let rng = &mut stream(4, 1, Stream::Resampling);
     let one = ladder(rotor, 0.0, CALM, rng);
     let mut other = one.clone();
-    other.iter_mut().for_each(|point| point.pulse_us += 4.0);
+    for point in &mut other {
+        point.pulse_us += 4.0;
+    }
     other.remove(5);
     let averaged = average(&common(vec![one.clone(), other]));
     assert_eq!(averaged.len(), one.len() - 1);

@@ -48,7 +48,8 @@ pub(super) struct Row {
 /// Values that share no second: one in each 10 s of each drone.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
-    pub(super) rows: Vec<Row>,
+    /// All of them, second by second.
+    pub(super) list: Vec<Row>,
     /// Index of the drone's and the second's row.
     pub(super) place: Vec<Vec<Option<usize>>>,
     /// Seconds of the record that the rows are at.
@@ -60,7 +61,7 @@ impl Rows {
     pub(super) fn of(drones: &[Drone], first: usize, step: usize) -> Self {
         let length = drones.iter().map(|drone| drone.values.len()).max().unwrap_or(0);
         let seconds: Vec<usize> = (first..length).step_by(step.max(1)).collect();
-        let mut rows = Vec::new();
+        let mut list = Vec::new();
         let mut place = vec![vec![None; seconds.len()]; drones.len()];
         for (block, second) in seconds.iter().enumerate() {
             for (index, drone) in drones.iter().enumerate() {
@@ -70,15 +71,15 @@ impl Rows {
                 common[..PARAMETERS].copy_from_slice(&value.law);
                 common[PARAMETERS..UNIFORM].copy_from_slice(&value.doubts_mps);
                 common[UNIFORM] = 1.0;
-                place[index][block] = Some(rows.len());
+                place[index][block] = Some(list.len());
                 let velocity_mps = drone.velocity_at(*second);
                 let time_s = *second as f64;
                 let spot = Spot { place_m, time_s, drone: Some(index), velocity_mps };
                 let noise_mps = value.noise_mps.max(LEAST_NOISE_MPS);
-                rows.push(Row { spot, value_mps: value.updraft_mps, common, noise_mps });
+                list.push(Row { spot, value_mps: value.updraft_mps, common, noise_mps });
             }
         }
-        Self { rows, place, seconds }
+        Self { list, place, seconds }
     }
 }
 

@@ -29,24 +29,24 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>
     let step = RUNNING_S as usize;
     let first = (input.seconds.saturating_sub(1) % step) / 2;
     let mut rows = Rows::of(input.drones, first, step);
-    while rows.rows.len() > MOST {
-        let every = rows.rows.len().div_ceil(MOST) * (rows.seconds.get(1)? - rows.seconds[0]);
+    while rows.list.len() > MOST {
+        let every = rows.list.len().div_ceil(MOST) * (rows.seconds.get(1)? - rows.seconds[0]);
         rows = Rows::of(input.drones, first, every);
     }
-    let n = rows.rows.len();
+    let n = rows.list.len();
     let covariances: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
     let component = input.calibration.known(air)?;
     let own_us: f64 = air.iter().map(|air| input.calibration.own_us(air).powi(2)).sum();
     let own_mps = own_us.sqrt() / input.slope.max(1.0);
     let mut of_air = DMatrix::zeros(n, n);
-    for (row, one) in rows.rows.iter().enumerate() {
-        for (column, other) in rows.rows[..=row].iter().enumerate() {
+    for (row, one) in rows.list.iter().enumerate() {
+        for (column, other) in rows.list[..=row].iter().enumerate() {
             let value = covariances.iter().map(|air| air.of(&one.spot, &other.spot)).sum();
             of_air[(row, column)] = value;
             of_air[(column, row)] = value;
         }
     }
-    let common = DMatrix::from_fn(n, COMMON, |row, column| rows.rows[row].common[column]);
+    let common = DMatrix::from_fn(n, COMMON, |row, column| rows.list[row].common[column]);
     let factor = prior_factor(Some(&component), false);
     let spread = &common * DMatrix::from_fn(COMMON, COMMON, |row, column| factor[(row, column)]);
     let mut of_values = &of_air + &spread * spread.transpose();
@@ -54,18 +54,18 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>
     let constant_mps: Vec<f64> =
         input.drones.iter().map(|drone| drone.own_mps().max(own_mps)).collect();
     for row in 0..n {
-        let drone = drone_of(&rows.rows[row]);
+        let drone = drone_of(&rows.list[row]);
         for column in 0..n {
-            if drone_of(&rows.rows[column]) == drone {
+            if drone_of(&rows.list[column]) == drone {
                 of_values[(row, column)] += constant_mps.get(drone).map_or(0.0, |sd| sd * sd);
             }
         }
-        of_values[(row, row)] += rows.rows[row].noise_mps.powi(2);
+        of_values[(row, row)] += rows.list[row].noise_mps.powi(2);
     }
     let mean = DVector::from_fn(COMMON, |row, _| component.shift.get(row).copied().unwrap_or(0.0));
-    let values = DVector::from_fn(n, |row, _| rows.rows[row].value_mps) - common * mean;
+    let values = DVector::from_fn(n, |row, _| rows.list[row].value_mps) - common * mean;
     let found = of_air * of_values.cholesky()?.solve(&values);
-    let best = rows.rows.iter().zip(found.iter()).map(|(row, value)| Best {
+    let best = rows.list.iter().zip(found.iter()).map(|(row, value)| Best {
         drone: drone_of(row),
         second: row.spot.time_s as usize,
         updraft_mps: *value,

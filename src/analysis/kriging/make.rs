@@ -27,8 +27,6 @@ const UNIFORM_SHARE: f64 = 0.2;
 /// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
-/// Standard errors to each side of a normal 95 % interval.
-pub(super) const NORMAL: f64 = 1.96;
 
 /// A flight's values with its calibration.
 pub(in super::super) struct Input<'a> {
@@ -86,7 +84,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let step = RUNNING_S as usize;
     let first = (input.seconds.saturating_sub(1) % step) / 2;
     let rows = Rows::of(input.drones, first, step);
-    if rows.rows.len() < FEWEST {
+    if rows.list.len() < FEWEST {
         return None;
     }
     let moves = input.drones.iter().any(|drone| !drone.hovers());
@@ -117,7 +115,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let own = input.calibration.own_us(&air) / input.slope.max(1.0);
     let own_mps: Vec<f64> = input.drones.iter().map(|drone| drone.own_mps().max(own)).collect();
     let search = Search { own_mps: &own_mps, ..search };
-    let samples = search.samples(&found, |point| {
+    let samples = Search::samples(&found, |point| {
         let system = search.system(found.form, point)?;
         let components = input.calibration.components(&search.air(found.form, point));
         let choices = choices(&system, &components);
@@ -129,7 +127,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let (mean, covariance, uniform_probability) = if moves {
         // With all values: the samples had only some.
         let components = input.calibration.components(&air);
-        let sample = Sample { point: found.best, weight: 1.0 };
+        let sample = Sample { weight: 1.0 };
         mixed(&[(sample, choices(&system, &components))])?
     } else {
         mixed(&samples)?
@@ -155,8 +153,8 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         drones,
         lost,
         air,
-        length_m: scale(&samples, &found, LN_LENGTH),
-        time_s: scale(&samples, &found, LN_TIME),
+        length_m: scale(&search, &found, LN_LENGTH),
+        time_s: scale(&search, &found, LN_TIME),
         adequacy,
         zero_shift_mps,
         uniform_probability,
@@ -237,27 +235,19 @@ fn mixed(samples: &[(Sample, Vec<Choice>)]) -> Option<(CommonVector, Common, f64
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
 }
 
-/// A scale that is searched as a logarithm, with its interval by the weighed samples, and by the curvature where that says
-/// less.
-fn scale<T>(samples: &[(Sample, T)], found: &Found, index: usize) -> Scale {
-    let mean: f64 = samples.iter().map(|(sample, _)| sample.weight * sample.point[index]).sum();
-    let variance: f64 = samples
-        .iter()
-        .map(|(sample, _)| sample.weight * (sample.point[index] - mean).powi(2))
-        .sum();
-    let sd = variance.max(found.covariance[(index, index)]).sqrt();
-    let at = |sds: f64| (found.best[index] + sds * sd).exp();
-    Scale { value: at(0.0), interval: [at(-NORMAL), at(NORMAL)] }
+/// A scale that is searched as a logarithm.
+fn scale(search: &Search<'_>, found: &Found, index: usize) -> Scale {
+    Scale { value: found.best[index].exp(), interval: search.interval(found, index).map(f64::exp) }
 }
 
 fn adequate(model: &Model<'_>, rows: &Rows, neighbours: &Neighbours) -> Adequacy {
     let left: Vec<f64> = rows
-        .rows
+        .list
         .iter()
         .map(|row| model.left(row.spot.drone, &row.common, row.value_mps))
         .collect();
     let innovations = innovations(rows, neighbours, &model.covariance, &left);
-    let drones: Vec<usize> = rows.rows.iter().map(|row| row.spot.drone.unwrap_or(0)).collect();
+    let drones: Vec<usize> = rows.list.iter().map(|row| row.spot.drone.unwrap_or(0)).collect();
     judge(&innovations, &drones)
 }
 
@@ -265,6 +255,6 @@ fn adequate(model: &Model<'_>, rows: &Rows, neighbours: &Neighbours) -> Adequacy
 fn shift(model: &Model<'_>, rows: &Rows) -> f64 {
     let mut mean = model.linear.mean;
     mean[UNIFORM] = 0.0;
-    let moved = rows.rows.iter().map(|row| -CommonVector::from(row.common).dot(&mean));
+    let moved = rows.list.iter().map(|row| -CommonVector::from(row.common).dot(&mean));
     crate::numeric::mean(moved).unwrap_or(0.0)
 }

@@ -68,10 +68,10 @@ struct Collector<'a> {
 }
 
 impl Collector<'_> {
-    fn add(&mut self, target: Spot, site: usize, target_noise_mps: f64, near: Vec<usize>) {
+    fn add(&mut self, target: Spot, site: usize, target_noise_mps: f64, near: &[usize]) {
         let Self { rows, found, known, moves } = self;
         let make = |near: &[usize]| {
-            let of = |row: &usize| rows.rows[*row];
+            let of = |row: &usize| rows.list[*row];
             Pattern {
                 target,
                 neighbours: near.iter().map(|row| of(row).spot).collect(),
@@ -80,17 +80,17 @@ impl Collector<'_> {
             }
         };
         let pattern = if *moves {
-            found.patterns.push(make(&near));
+            found.patterns.push(make(near));
             found.patterns.len() - 1
         } else {
             let relative = |row: &usize| {
-                let row = &rows.rows[*row];
+                let row = &rows.list[*row];
                 let lag = (row.spot.time_s - target.time_s).round() as i64;
                 (row.spot.drone.unwrap_or(usize::MAX), lag, noise_step(row.noise_mps))
             };
             let key = (site, noise_step(target_noise_mps), near.iter().map(relative).collect());
             *known.entry(key).or_insert_with(|| {
-                found.patterns.push(make(&near));
+                found.patterns.push(make(near));
                 found.patterns.len() - 1
             })
         };
@@ -150,8 +150,8 @@ pub(super) fn before(drones: &[Drone], rows: &Rows, reach: Reach) -> Neighbours 
             }
             let own = (0..block.saturating_sub(1)).rev().take(BACK);
             near.extend(own.filter_map(|block| at(index, block)).take(reach.own));
-            let seen = &rows.rows[row];
-            collector.add(seen.spot, index, seen.noise_mps, near);
+            let seen = &rows.list[row];
+            collector.add(seen.spot, index, seen.noise_mps, &near);
         }
     }
     collector.found
@@ -204,7 +204,7 @@ pub(super) fn around(
             }
             let velocity_mps = drone.map_or([0.0; 3], |drone| drones[drone].velocity_at(*second));
             let spot = Spot { place_m, time_s: *second as f64, drone: *drone, velocity_mps };
-            collector.add(spot, drones.len() + site, 1.0, near);
+            collector.add(spot, drones.len() + site, 1.0, &near);
         }
     }
     collector.found

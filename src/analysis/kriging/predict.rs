@@ -36,6 +36,9 @@ pub(in super::super) struct Series {
     pub(in super::super) over_all: Option<(f64, f64)>,
 }
 
+/// Mean and standard deviation, m/s; `None`: not known.
+pub(super) type Known = Option<(f64, f64)>;
+
 /// What is asked for at a place and time: the value, its variance, and what it hangs on.
 struct Asked {
     value_mps: f64,
@@ -81,7 +84,7 @@ impl Model<'_> {
         places_m: &[[f64; 3]],
         first: usize,
         step: usize,
-    ) -> Vec<(usize, Vec<Option<(f64, f64)>>)> {
+    ) -> Vec<(usize, Vec<Known>)> {
         let sites: Vec<(Option<usize>, [f64; 3])> =
             places_m.iter().map(|place| (None, *place)).collect();
         let found = self.phase(&sites, first, step).into_iter();
@@ -102,7 +105,7 @@ impl Model<'_> {
         let weights: Vec<Option<Weights>> =
             near.patterns.iter().map(|pattern| weights(pattern, &self.covariance, false)).collect();
         let left: Vec<f64> = rows
-            .rows
+            .list
             .iter()
             .map(|row| self.left(row.spot.drone, &row.common, row.value_mps))
             .collect();
@@ -130,15 +133,15 @@ impl Model<'_> {
 
     /// Mean over all rows, with its standard error, m/s.
     pub(super) fn fleet(&self, rows: &Rows) -> Option<(f64, f64)> {
-        let n = rows.rows.len() as f64;
-        if rows.rows.is_empty() {
+        let n = rows.list.len() as f64;
+        if rows.list.is_empty() {
             return None;
         }
         let mut mean = 0.0;
         let mut by_common = CommonVector::zeros();
         let mut by_own = vec![0.0; self.drones.len()];
         let mut noise = 0.0;
-        for row in &rows.rows {
+        for row in &rows.list {
             mean += self.left(row.spot.drone, &row.common, row.value_mps) / n;
             by_common -= CommonVector::from(row.common) / n;
             noise += (row.noise_mps / n).powi(2);
@@ -185,7 +188,7 @@ impl Model<'_> {
         for (weight, row) in weights.of.iter().zip(near) {
             let row = *row as usize;
             value_mps += weight * left[row];
-            let seen = &rows.rows[row];
+            let seen = &rows.list[row];
             for column in 0..COMMON {
                 by_common[column] -= weight * seen.common[column];
             }

@@ -46,9 +46,19 @@ const FARTHEST: f64 = 4.0;
 /// Step of the second differences. Numerical.
 const STEP: f64 = 0.05;
 /// Choices of the scales that stand for all that the values allow.
-const SAMPLES: usize = 48;
+const SAMPLES: usize = 64;
 /// Samples are drawn so much wider than the curvature at the maximum says: the tails are.
 const WIDER: f64 = 1.25;
+
+/// See [`Axis::reach`]. Numerical.
+const LEAST_REACH: f64 = 0.5;
+/// See [`Axis::reach`]. Numerical.
+const MOST_REACH: f64 = 3.0;
+/// Steps of the line on which a scale's interval is found, standard deviations, and how many to the lower side; twice as
+/// many to the upper one, where tails are longer. Numerical.
+const LINE_STEP: f64 = 0.35;
+/// See [`LINE_STEP`].
+const LINE_STEPS: i32 = 12;
 
 /// The likelihood of a record in its scales.
 #[derive(Clone, Copy)]
@@ -67,14 +77,26 @@ pub(super) struct Search<'a> {
 pub(super) struct Found {
     pub(super) form: Form,
     pub(super) best: Point,
+    /// Logarithm of the posterior there.
+    log_posterior: f64,
     /// Covariance of the scales.
     pub(super) covariance: SMatrix<f64, SCALES, SCALES>,
+    /// How far the posterior reaches to both sides of its top.
+    axes: Vec<Axis>,
 }
 
-/// Scales with their weight.
+/// One direction of the posterior of the scales, as far as one standard deviation by the curvature at the top.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    along: SVector<f64, SCALES>,
+    /// How much farther it reaches than the curvature says, ahead and behind: a slow strong air cannot be told from a
+    /// fast weak one by a short record, and the curvature at the top does not see that.
+    reach: [f64; 2],
+}
+
+/// Weight of a choice of the scales.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
-    pub(super) point: Point,
     pub(super) weight: f64,
 }
 
@@ -136,17 +158,13 @@ impl Search<'_> {
             .into_iter()
             .filter(|(_, _, value)| value.is_finite())
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
-        let covariance = self.curvature(form, &best, log_posterior)?;
-        Some(Found { form, best, covariance })
+        let covariance = self.curvature(form, &best, log_posterior);
+        let axes = self.axes(form, &best, log_posterior, &covariance);
+        Some(Found { form, best, log_posterior, covariance, axes })
     }
 
     /// Inverse of the curvature of the posterior at its top.
-    fn curvature(
-        &self,
-        form: Form,
-        best: &Point,
-        top: f64,
-    ) -> Option<SMatrix<f64, SCALES, SCALES>> {
+    fn curvature(&self, form: Form, best: &Point, top: f64) -> SMatrix<f64, SCALES, SCALES> {
         let value = |shifts: &[(usize, f64)]| {
             let mut point = *best;
             for (index, shift) in shifts {
@@ -186,29 +204,98 @@ impl Search<'_> {
                 vector.iter().zip(PRIOR).map(|(part, (_, sd))| part * part / (sd * sd)).sum();
             covariance += vector * vector.transpose() / value.max(prior);
         }
-        Some(covariance)
+        covariance
+    }
+
+    /// Directions of the posterior with how far it reaches to each side (the split normal of Rue, Martino and Chopin
+    /// 2009, section 6.5): where it has fallen by as much as a normal one would at the square root of two.
+    fn axes(
+        &self,
+        form: Form,
+        best: &Point,
+        top: f64,
+        covariance: &SMatrix<f64, SCALES, SCALES>,
+    ) -> Vec<Axis> {
+        let eigen = covariance.symmetric_eigen();
+        let sides: Vec<(usize, f64)> =
+            (0..SCALES).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]).collect();
+        let reach: Vec<f64> = sides
+            .par_iter()
+            .map(|(axis, sign)| {
+                let along =
+                    eigen.eigenvectors.column(*axis) * eigen.eigenvalues[*axis].max(0.0).sqrt();
+                let mut point = *best;
+                let by = sign * std::f64::consts::SQRT_2;
+                point.iter_mut().zip(along.iter()).for_each(|(own, along)| *own += by * along);
+                let fallen = top - self.log_posterior(form, &point);
+                if fallen.is_finite() { (1.0 / fallen.max(1e-3)).sqrt() } else { LEAST_REACH }
+            })
+            .map(|reach: f64| reach.clamp(LEAST_REACH, MOST_REACH))
+            .collect();
+        reach
+            .chunks_exact(2)
+            .enumerate()
+            .map(|(axis, reach)| Axis {
+                along: eigen.eigenvectors.column(axis) * eigen.eigenvalues[axis].max(0.0).sqrt(),
+                reach: [reach[0], reach[1]],
+            })
+            .collect()
+    }
+
+    /// The 95 % interval of one scale: the posterior along the line on which all others follow it.
+    pub(super) fn interval(&self, found: &Found, index: usize) -> [f64; 2] {
+        let sd = found.covariance[(index, index)].max(1e-12).sqrt();
+        let along = found.covariance.column(index) / sd;
+        let steps: Vec<f64> =
+            (-LINE_STEPS..=2 * LINE_STEPS).map(|step| f64::from(step) * LINE_STEP).collect();
+        let density: Vec<f64> = steps
+            .par_iter()
+            .map(|step| {
+                let mut point = found.best;
+                point.iter_mut().zip(along.iter()).for_each(|(own, by)| *own += step * by);
+                (self.log_posterior(found.form, &point) - found.log_posterior).min(1.0).exp()
+            })
+            .collect();
+        let all: f64 = density.iter().sum();
+        let at = |share: f64| {
+            let mut sum = 0.0;
+            for (step, density) in steps.iter().zip(&density) {
+                if sum + density >= share * all {
+                    let inner = (share * all - sum) / density.max(f64::MIN_POSITIVE) - 0.5;
+                    return found.best[index] + sd * (step + inner * LINE_STEP);
+                }
+                sum += density;
+            }
+            found.best[index] + sd * steps.last().copied().unwrap_or_default()
+        };
+        [at(0.025), at(0.975)]
     }
 
     /// Points that stand for all that the values allow, with weights that add up to one: drawn from the
     /// curvature at the top, and weighed by `log_weight` of the point, which is its log-posterior.
     pub(super) fn samples<T: Send>(
-        &self,
         found: &Found,
         weigh: impl Fn(&Point) -> Option<(f64, T)> + Sync,
     ) -> Vec<(Sample, T)> {
-        let Some(factor) = found.covariance.cholesky() else { return Vec::new() };
-        let factor = factor.l();
         let mut drawn: Vec<(Sample, T)> = (0..SAMPLES)
             .into_par_iter()
             .filter_map(|index| {
                 let normal = normals(index);
-                let offset = factor * normal * WIDER;
                 let mut point = found.best;
-                point.iter_mut().zip(offset.iter()).for_each(|(own, by)| *own += by);
+                // The density that it is drawn from, but for a constant.
+                let mut density = -0.5 * normal.norm_squared();
+                for (axis, normal) in found.axes.iter().zip(normal.iter()) {
+                    let reach = axis.reach[usize::from(*normal < 0.0)];
+                    density -= reach.ln();
+                    let by = normal * reach * WIDER;
+                    point
+                        .iter_mut()
+                        .zip(axis.along.iter())
+                        .for_each(|(own, along)| *own += by * along);
+                }
                 let (log_posterior, kept) = weigh(&point)?;
-                // The density that it was drawn from, but for a constant.
-                let weight = log_posterior + 0.5 * normal.norm_squared();
-                weight.is_finite().then_some((Sample { point, weight }, kept))
+                let weight = log_posterior - density;
+                weight.is_finite().then_some((Sample { weight }, kept))
             })
             .collect();
         let most = drawn.iter().map(|(sample, _)| sample.weight).fold(f64::NEG_INFINITY, f64::max);
@@ -253,7 +340,7 @@ fn outside(point: &Point) -> f64 {
 /// Normal deviates that fill the space evenly: Halton's sequence, mirrored, so that they have no mean.
 fn normals(index: usize) -> SVector<f64, SCALES> {
     const BASES: [usize; SCALES] = [2, 3, 5, 7, 11, 13, 17, 19];
-    let (half, sign) = (index / 2 + 11, if index % 2 == 0 { 1.0 } else { -1.0 });
+    let (half, sign) = (index / 2 + 11, if index.is_multiple_of(2) { 1.0 } else { -1.0 });
     SVector::from_fn(|row, _| sign * quantile(halton(half, BASES[row])))
 }
 

@@ -96,7 +96,7 @@ impl System {
         let mut own_score = DVector::zeros(drones);
         let (mut squares, mut ln_sd) = (0.0, 0.0);
         let mut constants: Vec<(usize, f64)> = Vec::new();
-        for (index, row) in rows.rows.iter().enumerate() {
+        for (index, row) in rows.list.iter().enumerate() {
             // What is skipped is no target, but others may be conditioned on it.
             let Some(Weights { of, variance }) = weights.get(neighbours.of[index]) else {
                 continue;
@@ -108,7 +108,7 @@ impl System {
             constants.clear();
             constants.push((row.spot.drone.unwrap_or(0), inverse));
             for (weight, near) in of.iter().zip(&neighbours.rows[index]) {
-                let near = &rows.rows[*near as usize];
+                let near = &rows.list[*near as usize];
                 value -= weight * near.value_mps;
                 for (own, other) in common.iter_mut().zip(&near.common) {
                     *own -= weight * other;
@@ -197,7 +197,7 @@ pub(super) fn innovations(
 ) -> Vec<f64> {
     let weights: Vec<Option<Weights>> =
         neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
-    (0..rows.rows.len())
+    (0..rows.list.len())
         .map(|index| {
             let Some(weights) = &weights[neighbours.of[index]] else { return f64::NAN };
             let near = weights.of.iter().zip(&neighbours.rows[index]);

@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn drones_in_the_same_air_are_one() {
         let one = record(7, 0.5, 10.0, 0.0, 600);
-        let alone = of(&[one.clone()]);
+        let alone = of(std::slice::from_ref(&one));
         let same = of(&vec![one; 9]);
         for (left, right) in alone.time_s.interval.into_iter().zip(same.time_s.interval) {
             assert!((left / right - 1.0).abs() < 0.1, "{alone:?} {same:?}");

@@ -108,6 +108,7 @@ fn air(rng: &mut Pcg64, sd_mps: f64) -> AirSettings {
         length_m: log_between(rng, (40.0, 150.0)),
         time_s: log_between(rng, (40.0, 300.0)),
         is_advected: unit(rng) < 0.5,
+        waves: None,
     };
     let law = unit(rng);
     let shear = if law < 0.4 {

@@ -22,6 +22,9 @@ pub struct FieldSettings {
     pub time_s: f64,
     /// Whether the field drifts with the mean wind.
     pub is_advected: bool,
+    /// Number of waves; absent: 48. A record of a smooth field of few waves tells them from a Gaussian field's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waves: Option<usize>,
 }
 
 /// A field of the updraft, with the Gaussian correlation of [`FieldSettings`].
@@ -44,7 +47,8 @@ impl Field {
     pub fn new(settings: &FieldSettings, wind_mps: [f64; 2], seed: u64) -> Self {
         let mut rng = stream(seed, 0, Purpose::Field);
         let mut draw = |scale: f64| normal(&mut rng) / scale;
-        let waves = (0..WAVES)
+        let count = settings.waves.unwrap_or(WAVES);
+        let waves = (0..count)
             .map(|_| Wave {
                 number_radpm: [0; 3].map(|_| draw(settings.length_m)),
                 rate_radps: draw(settings.time_s),
@@ -53,7 +57,7 @@ impl Field {
             })
             .collect();
         let [x, y] = if settings.is_advected { wind_mps } else { [0.0; 2] };
-        let amplitude_mps = settings.sd_mps * (2.0 / WAVES as f64).sqrt();
+        let amplitude_mps = settings.sd_mps * (2.0 / count as f64).sqrt();
         Self { amplitude_mps, drift_mps: [x, y, 0.0], waves }
     }
 
@@ -75,8 +79,13 @@ mod tests {
 
     #[test]
     fn it_correlates_over_its_length_and_drifts_with_the_wind() {
-        let settings =
-            FieldSettings { sd_mps: 0.5, length_m: 60.0, time_s: 1e4, is_advected: true };
+        let settings = FieldSettings {
+            sd_mps: 0.5,
+            length_m: 60.0,
+            time_s: 1e4,
+            is_advected: true,
+            waves: None,
+        };
         let (mut variance, mut apart, mut drifted, mut stayed) = (0.0, 0.0, 0.0, 0.0);
         let count = 600;
         for seed in 0..count {

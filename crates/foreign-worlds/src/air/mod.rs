@@ -155,6 +155,7 @@ mod tests {
                 length_m: 60.0,
                 time_s: 60.0,
                 is_advected: true,
+                waves: None,
             }),
             thermal: None,
             wind_mps: [3.0, -4.0],

@@ -73,12 +73,12 @@ pub(super) struct Candidate {
 
 impl Region {
     pub(super) fn of(rows: &Rows, wind_mps: Option<[f64; 2]>) -> Option<Self> {
-        let spots = || rows.rows.iter().map(|row| row.spot);
+        let spots = || rows.list.iter().map(|row| row.spot);
         let least =
             |axis: usize| spots().map(|spot| spot.place_m[axis]).fold(f64::INFINITY, f64::min);
         let most =
             |axis: usize| spots().map(|spot| spot.place_m[axis]).fold(f64::NEG_INFINITY, f64::max);
-        let (first, last) = (rows.rows.first()?, rows.rows.last()?);
+        let (first, last) = (rows.list.first()?, rows.list.last()?);
         let (low, high) = ([least(0), least(1)], [most(0), most(1)]);
         let beyond = [0, 1].map(|axis| (BEYOND * (high[axis] - low[axis])).max(BEYOND_M));
         Some(Self {
@@ -180,7 +180,7 @@ fn ln_root(sd: f64) -> f64 {
 /// What a thermal of peak 1 m/s adds to each value.
 pub(super) fn record(rows: &Rows, numbers: &Numbers, at_s: f64) -> Vec<f64> {
     let shape = Shape::new(numbers, at_s);
-    rows.rows
+    rows.list
         .iter()
         .map(|row| shape.mean(row.spot.place_m, row.spot.time_s, row.spot.velocity_mps))
         .collect()

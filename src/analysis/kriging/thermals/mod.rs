@@ -101,7 +101,7 @@ impl Record<'_> {
     /// The thermals of a record, the most certain first.
     pub(super) fn thermals(&self) -> Vec<Thermal> {
         let rows = self.search.rows;
-        let too_large = rows.rows.len() > MOST_VALUES || self.search.own_mps.len() > MOST_DRONES;
+        let too_large = rows.list.len() > MOST_VALUES || self.search.own_mps.len() > MOST_DRONES;
         let Some(region) = Region::of(rows, self.wind_mps).filter(|_| !too_large) else {
             return Vec::new();
         };
@@ -250,24 +250,24 @@ fn again(search: &Search<'_>, (form, start): Scales) -> Scales {
 }
 
 fn values(rows: &Rows) -> Vec<f64> {
-    rows.rows.iter().map(|row| row.value_mps).collect()
+    rows.list.iter().map(|row| row.value_mps).collect()
 }
 
 /// Rows less a thermal.
 fn without(rows: &Rows, candidate: &Candidate) -> Rows {
     let record = record(rows, &candidate.numbers, candidate.at_s);
     let own = rows
-        .rows
+        .list
         .iter()
         .zip(record)
         .map(|(row, share)| Row { value_mps: row.value_mps - candidate.peak_mps * share, ..*row });
-    Rows { rows: own.collect(), ..rows.clone() }
+    Rows { list: own.collect(), ..rows.clone() }
 }
 
 /// Whether enough drones meet a thermal.
 fn is_met(rows: &Rows, candidate: &Candidate) -> bool {
     let record = record(rows, &candidate.numbers, candidate.at_s);
-    let met = rows.rows.iter().zip(record).filter(|(_, share)| *share > MET);
+    let met = rows.list.iter().zip(record).filter(|(_, share)| *share > MET);
     let drones: std::collections::BTreeSet<Option<usize>> =
         met.map(|(row, _)| row.spot.drone).collect();
     drones.len() >= FEWEST_DRONES

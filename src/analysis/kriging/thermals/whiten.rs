@@ -49,8 +49,8 @@ impl<'a> Whitening<'a> {
             .map(|pattern| weights(pattern, covariance, true))
             .collect::<Option<_>>()?;
         let columns = COMMON + own_mps.len();
-        let mut raw = DMatrix::zeros(rows.rows.len(), columns);
-        for (index, row) in rows.rows.iter().enumerate() {
+        let mut raw = DMatrix::zeros(rows.list.len(), columns);
+        for (index, row) in rows.list.iter().enumerate() {
             for column in 0..COMMON {
                 raw[(index, column)] =
                     (0..COMMON).map(|inner| row.common[inner] * factor[(inner, column)]).sum();
@@ -58,9 +58,9 @@ impl<'a> Whitening<'a> {
             let Some(drone) = row.spot.drone else { continue };
             raw[(index, COMMON + drone)] = own_mps[drone].max(LEAST_OWN_MPS);
         }
-        let mut nuisance = DMatrix::zeros(rows.rows.len(), columns);
+        let mut nuisance = DMatrix::zeros(rows.list.len(), columns);
         let mut ln_density = 0.0;
-        for index in 0..rows.rows.len() {
+        for index in 0..rows.list.len() {
             let Weights { of, variance } = weights.get(neighbours.of[index])?;
             let inverse = 1.0 / variance.sqrt();
             ln_density += inverse.ln();
