@@ -184,9 +184,8 @@ fn share_law(drones: &mut [Drone]) {
     let known = || drones.iter().flat_map(|drone| drone.values.iter().flatten());
     let law =
         std::array::from_fn(|index| mean(known().map(|value| value.law[index])).unwrap_or(0.0));
-    let steady: Vec<(usize, f64)> = (WINDS.into_iter().chain([DENSITY]))
-        .map(|doubt| (doubt, mean(known().map(|value| value.doubts_mps[doubt])).unwrap_or(0.0)))
-        .collect();
+    let steady = [WINDS[0], WINDS[1], DENSITY]
+        .map(|doubt| (doubt, mean(known().map(|value| value.doubts_mps[doubt])).unwrap_or(0.0)));
     for value in drones.iter_mut().flat_map(|drone| drone.values.iter_mut().flatten()) {
         value.law = law;
         for (doubt, mps) in steady {
