@@ -9,7 +9,8 @@
 //! The kind is `still`, `field`, `gusty`, `advected`, `wind-change`, `thermal` or `drifting-thermal`; after `scan-` the
 //! fleet flies `scan-campaign`. `truth.csv` has the mean of the true vertical air speed over the 10 s around each second,
 //! along the planned way; `truth-thermal.json` the thermal. A fourth argument is the side of the grid (5), a fifth the
-//! distance of its drones (10 m).
+//! distance of its drones (10 m). Arguments with an equals sign, wherever behind the folder, set values of the campaign's
+//! templates: `'calibration.legs.speeds_mps=[3, 6]'`.
 
 #![expect(clippy::print_stderr, reason = "it says what went wrong")]
 
@@ -44,11 +45,15 @@ const STEPS: usize = 5;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let (Some(kind), Some(seed), Some(folder)) = (words.next(), words.next(), words.next()) else {
-        eprintln!("usage: foreign_campaign [scan-]KIND SEED FOLDER [SIDE] [SPACING]");
+        eprintln!(
+            "usage: foreign_campaign [scan-]KIND SEED FOLDER [SIDE] [SPACING] [KEY=VALUE...]"
+        );
         return Ok(());
     };
-    let side = words.next().map_or(Ok(5), |word| word.parse::<u32>())?;
-    let spacing_m = words.next().map_or(Ok(10.0), |word| word.parse::<f64>())?;
+    let (more, numbers): (Vec<String>, Vec<String>) = words.partition(|word| word.contains('='));
+    let mut numbers = numbers.into_iter();
+    let side = numbers.next().map_or(Ok(5), |word| word.parse::<u32>())?;
+    let spacing_m = numbers.next().map_or(Ok(10.0), |word| word.parse::<f64>())?;
     let (seed, root) = (seed.parse::<u64>()?, PathBuf::from(folder));
     let (template, kind) = kind
         .strip_prefix("scan-")
@@ -61,6 +66,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     if template == "campaign" {
         overrides.push(Override::new("duration_s", 300.0));
+    }
+    for word in &more {
+        overrides.push(Override::parse(word)?);
     }
     let planned = mission::resolve(template, &overrides)?;
     let host = Quiet::default();

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
-use super::aware::{ASKED_FOR, Aware};
+use super::aware::{ASKED_FOR, Aware, TYPICAL_SLOPE};
 use super::calibrate::{self, FitOptions};
 use super::cause::Cause;
 use super::caution::{fit_cautions, tilt_caution, wind_caution};
@@ -29,7 +29,7 @@ use super::refer::refer_calibration;
 use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindowStats,
+    LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
@@ -40,6 +40,7 @@ use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
+use super::wind_forms::{Belief, WindForms};
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
@@ -194,10 +195,14 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
+    let by_forms = input.wind_forms.map(|forms| {
+        let legs = reference.and_then(|reference| reference.wind_legs.as_ref());
+        forms.table(&believed(forms, legs, reference))
+    });
     let corrections = Corrections {
         density: input.density,
         leaning: input.leaning,
-        lean_table: input.lean_table,
+        lean_table: by_forms.as_ref().or(input.lean_table),
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
     };
@@ -255,6 +260,19 @@ pub fn analyze_flight(
     Ok(flight)
 }
 
+/// What is believed of drag and lift after the horizontal legs, if any were flown.
+fn believed(
+    forms: &WindForms,
+    legs: Option<&WindLegs>,
+    reference: Option<&FlightAnalysis>,
+) -> Belief {
+    let Some(legs) = legs else { return forms.prior() };
+    let slope = reference
+        .and_then(|reference| reference.flock.as_ref()?.linear.as_ref()?.parameters.first())
+        .map_or(TYPICAL_SLOPE, |slope| slope.estimate.value);
+    legs.posterior(forms, slope)
+}
+
 /// Unusable logs named in an error.
 const LISTED: usize = 20;
 
@@ -293,6 +311,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
             statistics.as_ref().and_then(|found| found.wind.as_ref()),
         );
     }
+    let wind_legs = input.plan.and_then(|plan| WindLegs::of(plan, &drones));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -308,6 +327,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         table: laws.table,
         map,
         statistics,
+        wind_legs: wind_legs.filter(|_| purpose == Purpose::Calibration),
         unmeasured,
         paper_table: laws.paper,
         warnings,
@@ -474,7 +494,7 @@ fn statistics(
     seen: &[HoverSeen],
 ) -> Option<FieldStatistics> {
     let Shared { input, options, .. } = shared;
-    let drag = match (input.leaning, input.lean_table) {
+    let drag = match (input.leaning, shared.corrections.lean_table) {
         (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
         (None, Some(table)) => LeanDrag::Table(table),
         (None, None) => LeanDrag::Unknown,
@@ -608,7 +628,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
     let map = UpdraftMap {
         law: shared.map_law.unwrap_or(LawKind::Linear),
         law_reason: law_reason(shared, levelled.as_ref()),
-        wind: match (shared.input.leaning, shared.input.lean_table) {
+        wind: match (shared.input.leaning, shared.corrections.lean_table) {
             _ if shared.input.level.is_some() => {
                 let response = shared.input.level.and_then(|level| level.response.as_ref());
                 response.map(|_| WindCorrection::Physics)

@@ -8,7 +8,7 @@
 use super::battery::{self, Pack, Sag, Slow};
 use super::budget::{BatteryCorrection, CommonError, ErrorBudget, Quality, QualityFlag};
 use super::cause::Cause;
-use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WIND};
+use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WINDS};
 use super::hover::{Hover, Second};
 use super::kriging::Value;
 use super::law::LawKind;
@@ -27,7 +27,7 @@ const NORMAL: f64 = 1.96;
 /// Seconds in a running mean, as in the paper.
 const RUNNING: f64 = 10.0;
 /// Slope of the pulse where nothing better is known, us/(m/s): the paper's A' of 26.4.
-const TYPICAL_SLOPE: f64 = 26.0;
+pub(super) const TYPICAL_SLOPE: f64 = 26.0;
 /// Beyond this the inverse is not searched, m/s: far outside any ladder. Convention.
 const FASTEST_MPS: f64 = 12.0;
 /// Least slope of a line's bend as a share of its slope in hover: keeps the inverse unique where bends
@@ -251,7 +251,7 @@ impl<'a> Aware<'a> {
         let steady = |doubt: usize| {
             mean(referred.iter().flatten().map(|(one, _)| one.doubts_us[doubt])).unwrap_or_default()
         };
-        let steady_us = [WIND, DENSITY].map(|doubt| (doubt, steady(doubt)));
+        let steady_us = [WINDS[0], WINDS[1], DENSITY].map(|doubt| (doubt, steady(doubt)));
         for one in referred {
             let found = one.and_then(|(one, _)| Some((one, values.air_mps(one.pulse_us)?)));
             let Some((one, air_mps)) = found else {
@@ -390,7 +390,7 @@ impl<'a> Aware<'a> {
             law_mps: (error.own_us2 + rest_us2).sqrt() / per_mps,
             zero_mps: zero_us2.sqrt() / per_mps,
             battery_mps: doubt(BATTERY).hypot(doubt(DRIFT)),
-            wind_mps: doubt(WIND),
+            wind_mps: doubt(WINDS[0]).hypot(doubt(WINDS[1])),
             density_mps: doubt(DENSITY),
             velocity_mps: bias,
             total_mps: 0.0,
@@ -422,13 +422,14 @@ impl<'a> Aware<'a> {
         let zero2 = (self.zero.common[(0, 0)].max(0.0) * basis[0] * basis[0]).min(shared2);
         let doubt = |index: usize| over(&|drone| drone.doubts_mps[index]).abs();
         let battery_mps = doubt(BATTERY).hypot(doubt(DRIFT));
-        let rest = battery_mps.hypot(doubt(WIND)).hypot(doubt(DENSITY));
+        let wind_mps = doubt(WINDS[0]).hypot(doubt(WINDS[1]));
+        let rest = battery_mps.hypot(wind_mps).hypot(doubt(DENSITY));
         CommonError {
             se_mps: shared2.sqrt().hypot(rest),
             half_width_mps: (self.zero.width * shared2.sqrt()).hypot(NORMAL * rest),
             zero_mps: zero2.sqrt(),
             battery_mps,
-            wind_mps: doubt(WIND),
+            wind_mps,
             density_mps: doubt(DENSITY),
             law_mps: (shared2 - zero2).max(0.0).sqrt(),
         }

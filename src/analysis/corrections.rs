@@ -7,12 +7,12 @@
 
 use super::battery::Pack;
 use super::density::Density;
-use super::lean_table::LeanTable;
+use super::lean_table::{DIRECTIONS, LeanTable};
 use super::wind::Leaning;
 use super::window::WindowStats;
 
-/// Doubts in their order: battery, drift, wind, density.
-pub(super) const DOUBTS: usize = 4;
+/// Doubts in their order: battery, drift, wind, density, and the wind's second direction.
+pub(super) const DOUBTS: usize = 5;
 /// Place of the battery's doubt.
 pub(super) const BATTERY: usize = 0;
 /// Place of the doubt about other drift in time.
@@ -21,6 +21,8 @@ pub(super) const DRIFT: usize = 1;
 pub(super) const WIND: usize = 2;
 /// Place of the density's doubt.
 pub(super) const DENSITY: usize = 3;
+/// Places of the wind's doubts: drag and lift are doubted in more than one direction.
+pub(super) const WINDS: [usize; DIRECTIONS] = [WIND, 4];
 
 /// Pulse at which the rotors make no thrust, us.
 const NO_THRUST_US: f64 = 1000.0;
@@ -119,7 +121,12 @@ impl Corrections<'_> {
         }
         // Both kinds of drift are scaled to us in `refer`.
         sigmas[DRIFT] = if self.warm_up_us.is_some() { 1.0 } else { 0.0 };
-        sigmas[WIND] = if self.knows_wind() { WIND_SHARE } else { UNKNOWN_WIND_SHARE };
+        match (self.leaning, self.lean_table) {
+            (Some(_), _) => sigmas[WIND] = WIND_SHARE,
+            // The table's own doubts are standard errors.
+            (None, Some(_)) => WINDS.iter().for_each(|wind| sigmas[*wind] = 1.0),
+            (None, None) => sigmas[WIND] = UNKNOWN_WIND_SHARE,
+        }
         sigmas[DENSITY] = match self.density {
             // AirSim's thrust is linear by definition; the weather of the day is not the standard's.
             Some(density) if density.exponent == 1.0 => 0.0,
@@ -143,8 +150,13 @@ impl Corrections<'_> {
             pulse_us = level;
         } else if let Some(table) = self.lean_table {
             let change = table.at(raw.lean_deg, raw.climb_mps);
-            let doubt = table.doubt_at(raw.lean_deg, raw.climb_mps);
-            doubts_us[WIND] = doubt.map_or(change, |doubt| doubt / WIND_SHARE);
+            let doubts = table.doubts_at(raw.lean_deg, raw.climb_mps);
+            let doubts = doubts.unwrap_or_else(|| {
+                std::array::from_fn(
+                    |direction| if direction == 0 { WIND_SHARE * change } else { 0.0 },
+                )
+            });
+            WINDS.iter().zip(doubts).for_each(|(wind, doubt)| doubts_us[*wind] = doubt);
             let at = |step: f64| table.at(raw.lean_deg, raw.climb_mps + step);
             steeper = (at(CLIMB_STEP_MPS) - at(-CLIMB_STEP_MPS)) / (2.0 * CLIMB_STEP_MPS);
             pulse_us -= change;

@@ -181,6 +181,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         indicator: crate::flight::Indicator::Pulse,
         orientation_deg: None,
         statistics: None,
+        wind_legs: None,
         name: String::new(),
         purpose: Purpose::Calibration,
         planned: true,

@@ -10,6 +10,7 @@ use super::lean_table::LeanTable;
 use super::levelled::Level;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
+use super::wind_forms::WindForms;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::flight::Indicator;
@@ -61,6 +62,8 @@ pub struct FlightInput<'a> {
     pub sag: Option<Sag>,
     /// Effect of wind on the vehicle's pulse, where its physics is known and
     /// [`FlightInput::leaning`] does not give it.
+    pub wind_forms: Option<&'a WindForms>,
+    /// Effect of wind on another indicator than the pulse, where the vehicle is known.
     pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
@@ -81,7 +84,14 @@ impl FlightInput<'_> {
             }
             Indicator::RotorSpeed | Indicator::Power => {
                 let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
-                Self { density: None, leaning: None, sag: None, lean_table, ..*self }
+                Self {
+                    density: None,
+                    leaning: None,
+                    sag: None,
+                    wind_forms: None,
+                    lean_table,
+                    ..*self
+                }
             }
         }
     }

@@ -6,6 +6,8 @@
 //! without wind.
 
 use crate::flight::Indicator;
+/// Directions in which what is doubted about drag and lift moves a table together.
+pub const DIRECTIONS: usize = 2;
 
 /// Change of the pulse by lean and vertical air speed.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,9 +24,9 @@ pub struct LeanTable {
     pub change_us: Vec<Vec<f64>>,
     /// Wind that each lean is held against, m/s. Empty: not known.
     pub wind_mps: Vec<f64>,
-    /// Standard errors of the changes from what is not known well about drag and lift, us. They do not
-    /// vanish where lift and the flow along the axis cancel each other. Empty: not known.
-    pub doubt_us: Vec<Vec<f64>>,
+    /// What one standard error of each direction of the doubt about drag and lift adds to the changes, us.
+    /// They do not vanish where lift and the flow along the axis cancel each other. Empty: not known.
+    pub doubts_us: Vec<Vec<Vec<f64>>>,
 }
 
 impl LeanTable {
@@ -33,9 +35,13 @@ impl LeanTable {
         self.of(&self.change_us, lean_deg, climb_mps)
     }
 
-    /// Standard error of that change, us; `None` where the table does not have it.
-    pub fn doubt_at(&self, lean_deg: f64, climb_mps: f64) -> Option<f64> {
-        (!self.doubt_us.is_empty()).then(|| self.of(&self.doubt_us, lean_deg, climb_mps))
+    /// What one standard error of each direction of its doubt adds to that change, us; `None` where the
+    /// table does not have it.
+    pub fn doubts_at(&self, lean_deg: f64, climb_mps: f64) -> Option<[f64; DIRECTIONS]> {
+        let of = |direction: usize| {
+            self.doubts_us.get(direction).map_or(0.0, |table| self.of(table, lean_deg, climb_mps))
+        };
+        (!self.doubts_us.is_empty()).then(|| std::array::from_fn(of))
     }
 
     /// Wind that a lean is held against, m/s, by linear interpolation; `None` where the table does not
@@ -79,7 +85,7 @@ mod tests {
             climb_step_mps: 1.0,
             change_us: vec![vec![0.0; 3], vec![-10.0, -8.0, -6.0]],
             wind_mps: vec![0.0, 3.0],
-            doubt_us: vec![vec![0.0; 3], vec![4.0; 3]],
+            doubts_us: vec![vec![vec![0.0; 3], vec![4.0; 3]]],
         };
         assert_eq!(table.wind_at(0.5), Some(0.75));
         assert_eq!(table.wind_at(2.5), None, "further than the table");
@@ -87,8 +93,8 @@ mod tests {
         assert_eq!(table.at(1.0, 0.0), -4.0);
         assert_eq!(table.at(2.0, 0.5), -7.0);
         assert_eq!(table.at(9.0, 9.0), -6.0);
-        assert_eq!(table.doubt_at(1.0, 0.3), Some(2.0));
-        assert_eq!(LeanTable::default().doubt_at(1.0, 0.3), None);
+        assert_eq!(table.doubts_at(1.0, 0.3), Some([2.0, 0.0]));
+        assert_eq!(LeanTable::default().doubts_at(1.0, 0.3), None);
         assert_eq!(LeanTable::default().at(3.0, 1.0), 0.0);
     }
 }

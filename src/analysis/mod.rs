@@ -63,6 +63,8 @@ mod truth;
 pub mod updraft;
 mod warning;
 pub mod wind;
+pub mod wind_forms;
+pub mod wind_legs;
 mod window;
 pub mod windows;
 mod zero;

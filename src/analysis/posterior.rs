@@ -1,7 +1,7 @@
 //! The posterior map of a flight ([`super::kriging`]) as part of its result.
 
 use super::budget::TruthCheck;
-use super::corrections::{DENSITY, WIND};
+use super::corrections::{DENSITY, WINDS};
 use super::drone::Shared;
 use super::kriging::{Air, Calibration, Drone, Form, Input, best, posterior};
 use super::result::{
@@ -184,7 +184,7 @@ fn share_law(drones: &mut [Drone]) {
     let known = || drones.iter().flat_map(|drone| drone.values.iter().flatten());
     let law =
         std::array::from_fn(|index| mean(known().map(|value| value.law[index])).unwrap_or(0.0));
-    let steady = [WIND, DENSITY]
+    let steady = [WINDS[0], WINDS[1], DENSITY]
         .map(|doubt| (doubt, mean(known().map(|value| value.doubts_mps[doubt])).unwrap_or(0.0)));
     for value in drones.iter_mut().flat_map(|drone| drone.values.iter_mut().flatten()) {
         value.law = law;

@@ -25,6 +25,7 @@ pub use super::table::TableRow;
 pub use super::thermal::Thermal;
 use super::warning::Warning;
 use super::wind::Leaning;
+pub use super::wind_legs::{WindLeg, WindLegs};
 pub use super::window::{Rejection, WindowStats};
 use crate::base::estimate::Estimate;
 use crate::base::sentence::Sentence;
@@ -88,6 +89,10 @@ pub struct FlightAnalysis {
     /// Statistics of the map: scales of the air in space and time, wind, averaging times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub statistics: Option<FieldStatistics>,
+    /// Horizontal legs of known ground speed: what they tell of drag and lift in wind. Absent: none were
+    /// flown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wind_legs: Option<WindLegs>,
     /// Drones whose log was read but gave no law (calibrations) or no value of the map
     /// (measurements).
     #[serde(default)]

@@ -16,7 +16,7 @@ use crate::mission::Plan;
 use crate::mission::resolve::builtin_names;
 use crate::workflow::check::{Origin, allowed, checked, is_safe, known, say_findings, verdict};
 use crate::workflow::clock::Stopwatch;
-use crate::workflow::plan::{what_for_whom, write};
+use crate::workflow::plan::{legs_buy, what_for_whom, write};
 
 /// Arguments of `updraft plan`.
 #[derive(Debug, Args)]
@@ -83,7 +83,10 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
         if !context.json && read.is_ok() {
             let is_example = args.mission.is_example(&flight.plan.site)?;
-            let told = timetable::describe(&flight.plan, context.width, is_example);
+            let mut told = timetable::describe(&flight.plan, context.width, is_example);
+            if let Some(bought) = legs_buy(&flight.plan, &flight.vehicle) {
+                told = format!("{told}\n{bought}");
+            }
             read = context.print(&format!("{}\n", words::wrap(&told, context.width)));
             if matches!(&read, Err(CommandError::Output(error)) if !is_end_of_pipe(error)) {
                 return read.map(|()| Exit::Done);

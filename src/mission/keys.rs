@@ -4,9 +4,9 @@ use toml::Table;
 use toml::Value as Toml;
 
 /// The keys that a template takes at its top, besides its parameters.
-pub(super) const TOP_LEVEL: [&str; 15] = [
+pub(super) const TOP_LEVEL: [&str; 16] = [
     "name", "title", "purpose", "vehicle", "site", "grid", "takeoff", "landing", "motion", "fence",
-    "window", "limits", "groups", "steps", "briefing",
+    "window", "limits", "groups", "steps", "legs", "briefing",
 ];
 /// Slips of the finger by which a mistyped key may differ from the one that was meant.
 const MAX_SLIPS: usize = 3;

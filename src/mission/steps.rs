@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use toml::Spanned;
 
 use super::error::TemplateError;
-use super::plan::{Segment, SegmentKind};
+use super::plan::{Purpose, Segment, SegmentKind};
 use super::source::Source;
 use super::template::{Direction, StepKind, StepTemplate, WindowTemplate, span_of};
 use super::window::WindowRule;
@@ -117,6 +117,7 @@ impl<'a> Timeline<'a> {
             span_of(&takeoff.altitude_m),
         )?;
         timeline.steps(&template.steps, None, 0)?;
+        timeline.legs()?;
         timeline.land()?;
         Ok(timeline.segments)
     }
@@ -180,11 +181,7 @@ impl<'a> Timeline<'a> {
                 let speed = self.speed(step, speed_mps)?;
                 let heading = self.required(step.heading_deg.as_ref(), "heading_deg", step)?;
                 let heading_deg = self.source.number(heading, "heading", "deg", -360.0..=360.0)?;
-                // Clockwise from x seen from above; y points to the left.
-                let (sin, cos) = heading_deg.to_radians().sin_cos();
-                let velocity = Vector3::new(cos * speed, -sin * speed, 0.0);
-                let label = format!("{speed} m/s towards {heading_deg}°");
-                self.timed(SegmentKind::Horizontal, &label, velocity, duration_ms, span)
+                self.horizontal(heading_deg, speed, duration_ms, span)
             }
             StepKind::Repeat => self.repeat(step, depth),
             StepKind::Stagger => self.wait_in_air(self.offset.own_ms),
@@ -192,6 +189,56 @@ impl<'a> Timeline<'a> {
                 self.wait_in_air(self.offset.largest_ms.saturating_sub(self.offset.own_ms))
             }
         }
+    }
+
+    fn horizontal(
+        &mut self,
+        heading_deg: f64,
+        speed_mps: f64,
+        duration_ms: u64,
+        span: Option<Range<usize>>,
+    ) -> Result<(), TemplateError> {
+        // Clockwise from x seen from above; y points to the left.
+        let (sin, cos) = heading_deg.to_radians().sin_cos();
+        let velocity = Vector3::new(cos * speed_mps, -sin * speed_mps, 0.0);
+        let label = format!("{speed_mps} m/s towards {heading_deg}°");
+        self.timed(SegmentKind::Horizontal, &label, velocity, duration_ms, span)
+    }
+
+    /// The horizontal legs that calibrate what wind does.
+    fn legs(&mut self) -> Result<(), TemplateError> {
+        let source = self.source;
+        let Some(spanned) = &source.template.legs else { return Ok(()) };
+        let (legs, span) = (spanned.get_ref(), span_of(spanned));
+        if source.template.purpose == Purpose::Measurement {
+            return Err(source
+                .error(span, "[legs] belong to a calibration")
+                .with_help("a measurement is measured along its horizontal steps"));
+        }
+        let speeds_mps =
+            source.numbers(&legs.speeds_mps, "speed", "m/s", &(0.01..=MAX_SPEED_MPS))?;
+        let headings_deg =
+            source.numbers(&legs.headings_deg, "heading", "deg", &(-360.0..=360.0))?;
+        let seconds =
+            |value, what| source.number(value, what, "s", MIN_DURATION_S..=MAX_DURATION_S);
+        let leg_ms = to_ms(seconds(&legs.duration_s, "duration of a leg")?);
+        let hover_ms = to_ms(seconds(&legs.hover_s, "duration of a hover")?);
+        let ramp_mps2 =
+            source.in_range(&legs.ramp_mps2, "ramp acceleration", "m/s²", 0.0..=50.0)?;
+        let usual_mps2 = self.ramp_mps2;
+        if usual_mps2 == 0.0 {
+            self.ramp_mps2 = ramp_mps2;
+        }
+        let label = format!("hover at {} m", self.rest_height_m());
+        self.timed(SegmentKind::Hover, &label, Vector3::zeros(), hover_ms, span.clone())?;
+        for speed_mps in speeds_mps {
+            for heading_deg in &headings_deg {
+                self.horizontal(*heading_deg, speed_mps, leg_ms, span.clone())?;
+                self.timed(SegmentKind::Hover, &label, Vector3::zeros(), hover_ms, span.clone())?;
+            }
+        }
+        self.ramp_mps2 = usual_mps2;
+        Ok(())
     }
 
     fn wait_in_air(&mut self, duration_ms: u64) -> Result<(), TemplateError> {

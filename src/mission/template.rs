@@ -99,6 +99,8 @@ pub struct FlightTemplate {
     pub groups: Vec<GroupTemplate>,
     /// Steps between take-off and landing, in order.
     pub steps: Vec<Spanned<StepTemplate>>,
+    /// Horizontal legs behind the steps, which calibrate what wind does to the vehicle.
+    pub legs: Option<Spanned<LegsTemplate>>,
     /// Preparations and warnings for the crew, one sentence each.
     #[serde(default)]
     pub briefing: Vec<String>,
@@ -186,6 +188,27 @@ pub struct WindowTemplate {
     pub trim_s: Spanned<f64>,
     /// Time left out at the start of a segment, s.
     pub settle_s: Spanned<f64>,
+}
+
+/// Horizontal legs that calibrate what wind does to the vehicle: each speed on each heading, with a hover before
+/// the first and behind each.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegsTemplate {
+    /// Speeds over ground, m/s.
+    pub speeds_mps: Spanned<Quantity>,
+    /// Headings at each speed, degrees clockwise from the show's x axis.
+    #[serde(default = "all_sides")]
+    pub headings_deg: Spanned<Quantity>,
+    /// Duration of a leg with its ramp, s.
+    #[serde(default = "leg_s")]
+    pub duration_s: Spanned<Quantity>,
+    /// Duration of a hover with its ramp, s.
+    #[serde(default = "between_legs_s")]
+    pub hover_s: Spanned<Quantity>,
+    /// Acceleration of the ramps where the flight has none of its own, m/s².
+    #[serde(default = "leg_ramp")]
+    pub ramp_mps2: Spanned<f64>,
 }
 
 /// Limits that differ from the vehicle's own.
@@ -307,6 +330,25 @@ fn at_default<T>(value: T) -> Spanned<T> {
 
 fn zero() -> Spanned<f64> {
     at_default(0.0)
+}
+
+/// There and back, and there and back across: the fleet ends where it began.
+fn all_sides() -> Spanned<Quantity> {
+    at_default(Quantity::List(vec![0.0, 180.0, 90.0, 270.0]))
+}
+
+/// Three seconds of ramp, three to settle, and a window of ten.
+fn leg_s() -> Spanned<Quantity> {
+    at_default(Quantity::Number(16.0))
+}
+
+fn between_legs_s() -> Spanned<Quantity> {
+    at_default(Quantity::Number(12.0))
+}
+
+/// Half of what show drones are allowed.
+fn leg_ramp() -> Spanned<f64> {
+    at_default(2.0)
 }
 
 fn zero_quantity() -> Spanned<Quantity> {

@@ -211,3 +211,28 @@ fn wrong_overrides_are_told_what_is_wrong() {
         assert!(error.contains(expected), "{text}: {error}");
     }
 }
+
+#[test]
+fn legs_behind_a_ladder_go_to_all_sides_and_back() {
+    let overrides = [set("vehicle=pixel"), set("grid.rows=2"), set("legs.speeds_mps=[3, 6]")];
+    let mission = resolve("calibration", &overrides).unwrap();
+    let flight = &mission.flights[0];
+    let segments = &flight.plan.groups[0].segments;
+    let legs: Vec<_> = segments.iter().filter(|s| s.kind == SegmentKind::Horizontal).collect();
+    assert_eq!(legs.len(), 8);
+    assert!(legs.iter().all(|leg| leg.window.is_some_and(|window| window.duration_s() >= 8.0)));
+    let fast = legs.iter().filter(|leg| leg.label.starts_with("6 m/s")).count();
+    assert_eq!(fast, 4);
+    let last = legs[7].end_ms;
+    let after = segments.iter().find(|s| s.kind == SegmentKind::Hover && s.start_ms >= last);
+    let after = after.unwrap();
+    assert!(after.window.is_some(), "a hover to compare with");
+    for (to, home) in after.to_m.into_iter().zip([0.0, 0.0, 20.0]) {
+        assert!((to - home).abs() < 1e-6, "{:?}", after.to_m);
+    }
+    let plain = plan_of("calibration", &["vehicle=pixel", "grid.rows=2"]).groups.remove(0).segments;
+    let before = plain.len() - 1;
+    assert_eq!(segments[..before], plain[..before], "the ladder is as it was");
+    let refused = resolve("hover", &[set("legs.speeds_mps=[3]")]).unwrap_err().to_string();
+    assert!(refused.contains("[legs] belong to a calibration"), "{refused}");
+}

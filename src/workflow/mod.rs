@@ -55,6 +55,7 @@ pub mod simulate;
 pub mod slots;
 pub mod study;
 pub(crate) mod times;
+pub(crate) mod wind_forms;
 pub(crate) mod words;
 
 /// Program and version, for records.

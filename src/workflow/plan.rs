@@ -4,13 +4,18 @@ use std::path::Path;
 
 use super::error::WorkflowError;
 use super::host::Host;
+use super::wind_forms::wind_forms;
 use super::words;
+use crate::analysis::wind_legs::{Bought, bought};
 use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
 use crate::campaign::write::{FlightFiles, folders, write_index};
 use crate::campaign::{self, CampaignError, FlightFolder};
+use crate::mission::Plan;
+use crate::mission::plan::{Purpose, SegmentKind};
 use crate::mission::resolve::Mission;
 use crate::show::Show;
+use crate::vehicle::Vehicle;
 
 /// The flights and the fleet in words: `calibration and hover for 49 drones`.
 pub fn what_for_whom(mission: &Mission) -> String {
@@ -84,6 +89,39 @@ fn refuse_occupied(
         )));
     }
     if force { Ok(()) } else { occupied("another plan") }
+}
+
+/// Winds for which it is told what legs buy, m/s.
+const TOLD_WINDS_MPS: [f64; 2] = [5.0, 8.0];
+/// Standard errors in half of a 95 % interval.
+const NORMAL: f64 = 1.96;
+
+/// What the horizontal legs of a calibration buy in wind, in a sentence; `None` without legs, and for vehicles
+/// whose lean tells no wind.
+pub fn legs_buy(plan: &Plan, vehicle: &Vehicle) -> Option<String> {
+    let legs = plan
+        .groups
+        .first()?
+        .segments
+        .iter()
+        .filter(|segment| segment.kind == SegmentKind::Horizontal && segment.window.is_some());
+    let ground_mps: Vec<[f64; 2]> =
+        legs.map(|leg| [leg.velocity_mps[0], leg.velocity_mps[1]]).collect();
+    if ground_mps.len() < 2 || plan.purpose != Purpose::Calibration {
+        return None;
+    }
+    let forms = wind_forms(plan.site.ground_amsl_m, vehicle)?;
+    let told = TOLD_WINDS_MPS.map(|wind_mps| {
+        let Bought { without_mps, with_mps } = bought(&forms, &ground_mps, wind_mps);
+        let (without, with) = (NORMAL * without_mps, NORMAL * with_mps);
+        format!("+-{with:.2} instead of +-{without:.2} m/s in {wind_mps} m/s of wind")
+    });
+    Some(format!(
+        "The {} horizontal legs calibrate lean and lift: flown in light wind, what is unknown of them moves a \
+         later map by {} (95 %, common to all drones)",
+        ground_mps.len(),
+        told.join(", ")
+    ))
 }
 
 /// Shows of a mission's flights, in their order.

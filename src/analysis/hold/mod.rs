@@ -24,7 +24,7 @@ use self::points::{Point, average, common, keyed};
 use self::shift::{Flights, Shift, shift};
 use super::battery::{self, Pack, Sag};
 use super::budget::BatteryCorrection;
-use super::corrections::{Corrections, DOUBTS, WIND};
+use super::corrections::{Corrections, DOUBTS, WINDS};
 use super::reference::same_drone;
 use super::result::{DroneAnalysis, FlightAnalysis, Laws, WindowStats};
 use super::stats::mean_sd;
@@ -178,12 +178,13 @@ impl<'a> Holding<'a> {
     /// Standard error of the shift by wind: that the corrections are off by their doubt, or, where there are none,
     /// what another lean may do at most, as two standard errors.
     fn wind_mps(&self, there: &[Point], here: &[Point]) -> f64 {
-        let change = |value: fn(&Point) -> f64| {
+        let change = |value: &dyn Fn(&Point) -> f64| {
             let over = |points: &[Point]| mean(points.iter().map(value)).unwrap_or_default();
             over(here) - over(there)
         };
-        let pulse_us = self.sigmas[WIND] * change(|point| point.doubts_us[WIND]);
-        let along_mps = 0.5 * change(|point| point.axial_mps);
+        let of_doubt = |doubt: usize| self.sigmas[doubt] * change(&|point| point.doubts_us[doubt]);
+        let pulse_us = WINDS.into_iter().map(of_doubt).fold(0.0, f64::hypot);
+        let along_mps = 0.5 * change(&|point| point.axial_mps);
         (pulse_us / self.slope).hypot(along_mps)
     }
 

@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::super::air_prior::Air;
-use super::super::corrections::{DOUBTS, DRIFT, WIND};
+use super::super::corrections::{DOUBTS, DRIFT, WINDS};
 use super::curve::{LENGTHS_MPS, RESTS_US, Rest, basis, bent, beyond_us};
 use super::points::Point;
 use crate::numeric::{extent, mean};
@@ -291,7 +291,7 @@ impl<'a> Model<'a> {
             let sigma = self.flights.sigmas[doubt];
             sigma * sigma * left.doubts_us[doubt] * right.doubts_us[doubt]
         };
-        (0..DOUBTS).filter(|doubt| ![DRIFT, WIND].contains(doubt)).map(of).sum()
+        (0..DOUBTS).filter(|doubt| *doubt != DRIFT && !WINDS.contains(doubt)).map(of).sum()
     }
 
     /// The choices of the scales that count, heaviest first.

@@ -52,8 +52,8 @@ impl LeanDrag<'_> {
     fn words(self) -> &'static str {
         match self {
             Self::Table(_) => {
-                "the drag of rotors and body in the vehicle's own physics, which is known to some 8 % (the \
-                 ± is the spread of the drones alone)"
+                "the drag of rotors and body in the vehicle's own physics, which a file alone knows to a third \
+                 (the ± is the spread of the drones alone)"
             }
             _ => "the vehicle's drag",
         }

@@ -190,7 +190,8 @@ fn input<'a>(
         thrust_exponent: flight.thrust_exponent,
         sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
         true_air: flight.true_air.as_ref(),
-        lean_table: table.or(flight.lean_table.as_ref()).filter(|_| !without.wind),
+        wind_forms: flight.wind_forms.as_ref().filter(|_| !without.wind),
+        lean_table: table.filter(|_| !without.wind),
         level: flight.level.as_ref(),
         folder: Some(&work.root),
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::files::logs_in;
-use super::leaning::{lean_table, leaning};
+use super::leaning::{leaning, leans_by_rotors};
 use super::of_start;
 use super::physics::{density, linear_thrust, sag};
 use super::true_scales::true_scales;
@@ -20,6 +20,7 @@ use crate::mission::Plan;
 use crate::sim::air::truth::{self, TrueUpdraft};
 use crate::vehicle::library;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::wind_forms::wind_forms;
 
 /// What a flight's folder holds.
 pub(super) fn found_flight(
@@ -61,16 +62,16 @@ pub(super) fn found_flight(
         notes.extend(doubts);
         start
     };
-    let pulse_table = vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle));
-    let has_table = pulse_table.is_some();
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         sag: sag(flown.is_some(), vehicle.as_ref()),
-        lean_table: pulse_table,
+        wind_forms: vehicle
+            .as_ref()
+            .and_then(|vehicle| wind_forms(plan.site.ground_amsl_m, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
         level: None,
-        response_of: vehicle.clone().filter(|_| has_table),
+        response_of: vehicle.clone().filter(leans_by_rotors),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),

@@ -24,6 +24,7 @@ use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;
 use crate::analysis::statistics::result::TrueAir;
 use crate::analysis::wind::Leaning;
+use crate::analysis::wind_forms::WindForms;
 use crate::analysis::{Level, LogInput, TruthSeries};
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
@@ -67,7 +68,7 @@ pub struct Found {
     /// Effect of the battery on the pulse, if known.
     pub sag: Option<Sag>,
     /// Effect of wind on the pulse of a leaning drone, if known.
-    pub lean_table: Option<LeanTable>,
+    pub wind_forms: Option<WindForms>,
     /// Response of the vehicle whose level the flight gives, if that was asked for.
     pub level: Option<Level>,
     /// Vehicle whose response says what wind does to other indicators than the pulse, if it is known.
@@ -215,7 +216,7 @@ pub fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, WorkflowEr
 }
 
 /// What wind does to an indicator by the lean, for each flight of the work; `None` where the vehicle does not say, and
-/// for the pulse, whose tables the flights have themselves.
+/// for the pulse, of which the flights have [`Found::wind_forms`].
 pub(crate) fn lean_tables(work: &Work, indicator: Indicator) -> Vec<Option<LeanTable>> {
     let of = |flight: &Found| {
         let vehicle = flight.response_of.as_ref().filter(|_| indicator != Indicator::Pulse)?;

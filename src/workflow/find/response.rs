@@ -18,7 +18,7 @@ const CLIMBS: usize = 25;
 const FIRST_CLIMB_MPS: f64 = -6.0;
 const CLIMB_STEP_MPS: f64 = 0.5;
 /// Standard error of the drag that tells the wind from the lean, relative: the file is that of a kind of vehicle, not of
-/// the one that flew. Chosen: four times the doubt of a vehicle that is known (`leaning.rs`).
+/// the one that flew. Chosen; of the rotors' drag alone less is known (`workflow/wind_forms.rs`).
 const DRAG_ERROR: f64 = 0.3;
 /// Standard error of the lift that rotors gain in wind, relative: it comes from the share lost to the inflow, which is
 /// known as well as the slope.

@@ -158,6 +158,7 @@ pub(crate) fn calibration(
         map: None,
         unmeasured: Vec::new(),
         statistics: None,
+        wind_legs: None,
         paper_table: Some(PaperTable::Simulation),
     }
 }
@@ -488,6 +489,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             ),
         }],
         statistics: None,
+        wind_legs: None,
         paper_table: None,
         map: Some(UpdraftMap {
             law: LawKind::SignedQuadratic,
