@@ -340,6 +340,16 @@ pub fn fields_parquet(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft.parquet")
 }
 
+/// Path of the posterior map between the drones as CSV, in the folder of an analysis.
+pub fn fields_grid_csv(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft-grid.csv")
+}
+
+/// Path of the posterior map between the drones as Parquet, in the folder of an analysis.
+pub fn fields_grid_parquet(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft-grid.parquet")
+}
+
 /// Path of the simulation study that belongs to a campaign.
 pub fn study_folder(folder: &Path) -> PathBuf {
     folder.join("study")

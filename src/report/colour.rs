@@ -49,6 +49,11 @@ pub(super) fn sequential(fraction: f64) -> String {
     hex(blend(&VIRIDIS, fraction.clamp(0.0, 1.0) * 0.92))
 }
 
+/// [`sequential`] as bytes.
+pub(super) fn sequential_rgb(fraction: f64) -> [u8; 3] {
+    blend(&VIRIDIS, fraction.clamp(0.0, 1.0) * 0.92).map(|c| c.round() as u8)
+}
+
 /// Diverging colour at `position` of -1..1: blue, white, red.
 pub(super) fn diverging(position: f64) -> String {
     hex(blend(&DIVERGING, f64::midpoint(position, 1.0)))

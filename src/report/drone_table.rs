@@ -20,6 +20,7 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("slot", true),
         ("drone", false),
         ("W* (m/s)", true),
+        ("posterior W (m/s)", true),
         ("systematic ± (m/s)", true),
         ("true W (m/s)", true),
         ("mapping", false),
@@ -59,6 +60,7 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 drone.slot.map_or_else(none, |slot| slot.to_string()),
                 shortened(&drone.name, 28),
                 air.map_or_else(none, |air| estimate(air.mean)),
+                air.and_then(|air| air.posterior_mean).map_or_else(none, estimate),
                 air.filter(|air| usable(air.systematic_mps) && air.systematic_mps > 0.0)
                     .map_or_else(none, |air| fixed(air.systematic_mps, 2)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),

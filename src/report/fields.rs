@@ -6,7 +6,10 @@
 use std::fmt::Write as _;
 use std::io;
 
-use crate::analysis::result::{Analysis, DroneUpdraft, QualityFlag};
+use crate::analysis::result::{
+    Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, QualityFlag, UpdraftMap,
+};
+use crate::numeric::median;
 
 use super::text::clean;
 
@@ -26,6 +29,12 @@ pub const COLUMNS: [&str; 13] = [
     "flags",
     "truth_mps",
 ];
+
+/// Names of the columns that follow where a map has a posterior.
+pub const POSTERIOR_COLUMNS: [&str; 2] = ["posterior_mps", "posterior_sd_mps"];
+
+/// Stands among the flags of a drone without a log, whose air its neighbours tell.
+const FILLED: &str = "filled";
 
 /// A row of the measured fields: one drone in one second.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,21 +65,54 @@ pub struct FieldRow {
     pub flags: String,
     /// True vertical air speed, m/s, up positive, where it is known.
     pub truth_mps: Option<f64>,
+    /// Posterior mean of the vertical air speed, m/s, up positive.
+    pub posterior_mps: Option<f64>,
+    /// Its standard deviation, all origins of error included, m/s.
+    pub posterior_sd_mps: Option<f64>,
 }
 
-/// Rows of all flights, flight by flight and drone by drone.
+/// Rows of all flights, flight by flight and drone by drone; drones without a log come last.
 pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
     analysis.flights.iter().flat_map(|flight| {
         let map = flight.map.iter();
-        map.flat_map(move |map| {
-            map.drones.iter().flat_map(move |drone| {
-                map.time_s
-                    .iter()
-                    .enumerate()
-                    .map(move |(index, &time_s)| row(&flight.name, drone, index, time_s))
-            })
-        })
+        map.flat_map(move |map| measured(flight, map).chain(filled(flight, map)))
     })
+}
+
+/// Rows of the drones with a log.
+fn measured<'a>(
+    flight: &'a FlightAnalysis,
+    map: &'a UpdraftMap,
+) -> impl Iterator<Item = FieldRow> + 'a {
+    map.drones.iter().flat_map(move |drone| {
+        let times = map.time_s.iter().enumerate();
+        times.map(move |(index, &time_s)| row(&flight.name, drone, index, time_s))
+    })
+}
+
+/// Rows of the drones without one.
+fn filled<'a>(
+    flight: &'a FlightAnalysis,
+    map: &'a UpdraftMap,
+) -> impl Iterator<Item = FieldRow> + 'a {
+    let height_m = median(map.drones.iter().map(|drone| drone.height_m).collect());
+    let drones = map.posterior.iter().flat_map(|posterior| &posterior.filled);
+    drones.flat_map(move |drone| {
+        let times = map.time_s.iter().enumerate();
+        times.map(move |(index, &time_s)| filled_row(&flight.name, drone, height_m, index, time_s))
+    })
+}
+
+/// Whether any map has a posterior, and the tables its columns.
+pub fn has_posterior(analysis: &Analysis) -> bool {
+    let mut maps = analysis.flights.iter().filter_map(|flight| flight.map.as_ref());
+    maps.any(|map| map.posterior.is_some())
+}
+
+/// Names of the columns of an analysis.
+pub fn columns(analysis: &Analysis) -> Vec<&'static str> {
+    let more: &[&str] = if has_posterior(analysis) { &POSTERIOR_COLUMNS } else { &[] };
+    COLUMNS.iter().chain(more).copied().collect()
 }
 
 /// Whether the analysis has any rows.
@@ -78,8 +120,38 @@ pub fn any(analysis: &Analysis) -> bool {
     rows(analysis).next().is_some()
 }
 
+fn finite(value: Option<f64>) -> Option<f64> {
+    value.filter(|v| v.is_finite())
+}
+
+fn filled_row(
+    flight: &str,
+    drone: &FilledDrone,
+    height_m: Option<f64>,
+    index: usize,
+    time_s: f64,
+) -> FieldRow {
+    let value = |of: &[Option<f64>]| finite(of.get(index).copied().flatten());
+    FieldRow {
+        flight: clean(flight),
+        time_s,
+        slot: Some(drone.slot),
+        drone: format!("slot {}", drone.slot),
+        x_m: finite(Some(drone.position_m[0])),
+        y_m: finite(Some(drone.position_m[1])),
+        z_m: finite(height_m),
+        w_mps: None,
+        sd_mps: None,
+        low_mps: None,
+        high_mps: None,
+        flags: FILLED.to_owned(),
+        truth_mps: None,
+        posterior_mps: value(&drone.posterior_mps),
+        posterior_sd_mps: value(&drone.posterior_sd_mps),
+    }
+}
+
 fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRow {
-    let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
     let interval = drone.interval_mps.get(index).copied().flatten();
     let place = if drone.track_m.is_empty() {
         let at = drone.position_m;
@@ -102,6 +174,8 @@ fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRo
         high_mps: finite(interval.map(|interval| interval[1])),
         flags: flags(&drone.quality, time_s),
         truth_mps: finite(drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied())),
+        posterior_mps: finite(drone.posterior_mps.get(index).copied().flatten()),
+        posterior_sd_mps: finite(drone.posterior_sd_mps.get(index).copied().flatten()),
     }
 }
 
@@ -123,7 +197,8 @@ fn flags(quality: &[QualityFlag], time_s: f64) -> String {
 ///
 /// The error of the output.
 pub fn write_csv(analysis: &Analysis, out: &mut dyn io::Write) -> io::Result<()> {
-    writeln!(out, "{}", COLUMNS.join(","))?;
+    writeln!(out, "{}", columns(analysis).join(","))?;
+    let posterior = has_posterior(analysis);
     let mut line = String::new();
     for row in rows(analysis) {
         line.clear();
@@ -139,20 +214,24 @@ pub fn write_csv(analysis: &Analysis, out: &mut dyn io::Write) -> io::Result<()>
         }
         let _ = write!(line, ",{}", row.flags);
         number(&mut line, row.truth_mps, 4);
+        if posterior {
+            number(&mut line, row.posterior_mps, 4);
+            number(&mut line, row.posterior_sd_mps, 4);
+        }
         line.push('\n');
         out.write_all(line.as_bytes())?;
     }
     Ok(())
 }
 
-fn number(line: &mut String, value: Option<f64>, decimals: usize) {
+pub(super) fn number(line: &mut String, value: Option<f64>, decimals: usize) {
     line.push(',');
     if let Some(value) = value {
         let _ = write!(line, "{value:.decimals$}");
     }
 }
 
-fn quoted(line: &mut String, text: &str) {
+pub(super) fn quoted(line: &mut String, text: &str) {
     if text.contains([',', '"', '\n', '\r']) {
         let _ = write!(line, "\"{}\"", text.replace('"', "\"\""));
     } else {

@@ -88,6 +88,20 @@ impl<'a> Frames<'a> {
         estimate(self.map, drone, time)
     }
 
+    /// Posterior mean of a drone at a time with its standard deviation, m/s.
+    pub(super) fn posterior(&self, drone: usize, time: usize) -> Option<[f64; 2]> {
+        let drone = self.map.drones.get(drone)?;
+        let value = |of: &[Option<f64>]| of.get(time).copied().flatten().filter(|w| usable(*w));
+        Some([value(&drone.posterior_mps)?, value(&drone.posterior_sd_mps)?])
+    }
+
+    /// Places of drones without a log whose air their neighbours tell, [forward, left], m.
+    pub(super) fn lost(&self) -> Vec<[f64; 2]> {
+        let filled = self.map.posterior.iter().flat_map(|posterior| &posterior.filled);
+        let places = filled.map(|drone| drone.position_m);
+        places.filter(|place| usable(place[0]) && usable(place[1])).collect()
+    }
+
     /// The true air, m/s.
     pub(super) fn truth(&self, drone: usize, time: usize) -> Option<f64> {
         true_air(self.map, drone, time)

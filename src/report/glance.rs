@@ -17,6 +17,7 @@ use super::fleet_air::fleet_air;
 use super::headline;
 use super::law;
 use super::page::capitalised;
+use super::posterior;
 use super::text::{clean, count, error_of, fixed, signed, unit, usable, value_of};
 
 /// More flights than this are summed up at the top of the page.
@@ -67,6 +68,11 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
         let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
         let note = format!("{}{spread}", air.error.words(2)).replace("95 %", "95\u{a0}%");
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
+        if let Some(fleet) = flight.map.as_ref().and_then(posterior::fleet) {
+            let label = format!("posterior mean, {}", clean(&flight.name));
+            let note = posterior::interval(fleet).replace("95 %", "95\u{a0}%");
+            tile(value_of(fleet), label, note);
+        }
         if let Some(rms) = air.rms_error {
             // Of values over 10 s it is another number, which the text below the map tells.
             let note = format!(
@@ -188,6 +194,9 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
                         signed(air.highest, 2),
                     )
                 };
+            }
+            if let Some(words) = flight.map.as_ref().and_then(posterior::headline) {
+                let _ = write!(text, ", {words}");
             }
             let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
             if noted > 0 {

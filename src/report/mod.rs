@@ -16,6 +16,7 @@ mod compare;
 mod drone_table;
 mod errors;
 pub mod fields;
+pub mod fields_grid;
 #[cfg(feature = "parquet")]
 pub mod fields_parquet;
 mod figures;
@@ -36,6 +37,8 @@ mod offset_field;
 mod page;
 mod page_air;
 mod page_flight;
+mod posterior;
+mod posterior_grid;
 mod raster;
 mod scales;
 mod shapes;

@@ -7,10 +7,15 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::axis::decimals_of;
 use super::colour::diverging;
-use super::figures::{air, averaging, correlation, evolution, levelled, map as figure_map, track};
+use super::figures::map::Means;
+use super::figures::{
+    air, averaging, correlation, evolution, levelled, map as figure_map, posterior, track,
+};
 use super::film::film;
 use super::frames::Frames;
 use super::page::{Gallery, capitalised, flight_key};
+use super::posterior as words;
+use super::posterior_grid::GridField;
 use super::text::{clean, fixed, signed, usable};
 use super::{errors, scales};
 
@@ -27,9 +32,22 @@ pub(super) fn air_section(
     let map = flight.map.as_ref()?;
     let key = flight_key(analysis, index);
     let frames = Frames::of(map);
-    let mean = figure_map::mean_map(analysis, flight, &key, map).map(|figure| figures.show(figure));
-    let shown = frames.as_ref().and_then(|frames| film(map, frames)).map(|film| {
+    let field = GridField::of(map);
+    let alone = figure_map::mean_map(analysis, flight, &key, map, Means::Alone);
+    let together = map
+        .posterior
+        .as_ref()
+        .and_then(|_| figure_map::mean_map(analysis, flight, &key, map, Means::Posterior));
+    // What each drone tells alone stands behind what all tell together.
+    let (mean, alone) = match together {
+        Some(together) => (Some(together), alone),
+        None => (alone, None),
+    };
+    let mean = mean.map(|figure| figures.show(figure));
+    let shown = frames.as_ref().and_then(|frames| film(map, frames, field.as_ref())).map(|film| {
         context! {
+            posterior => film.posterior,
+            field => field.is_some(),
             id => format!("film-{key}"),
             json => Value::from_safe_string(film.json),
             step => fixed(film.step_s, usize::from(film.step_s.fract() > 0.05)),
@@ -40,8 +58,18 @@ pub(super) fn air_section(
                 colour_bar(frames.as_ref().map_or(1.0, |frames| frames.difference_limit_mps)),
         }
     });
+    let still = |field: Option<&GridField<'_>>| {
+        let frames = frames.as_ref()?;
+        evolution::figure(flight, &key, frames, wind(flight), field)
+    };
+    let (still, still_alone) = match &field {
+        Some(field) => (still(Some(field)), still(None)),
+        None => (still(None), None),
+    };
+    let between = frames.as_ref().zip(field.as_ref());
     let more: Vec<Value> = [
-        frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, wind(flight))),
+        still,
+        between.and_then(|(frames, field)| posterior::figure(flight, &key, frames, field)),
         track::figure(flight, &key, map),
         air::figure(flight, &key, map),
         levelled::figure(flight, &key, map),
@@ -50,6 +78,8 @@ pub(super) fn air_section(
     .flatten()
     .map(|figure| figures.show(figure))
     .collect();
+    let alone: Vec<Value> =
+        [alone, still_alone].into_iter().flatten().map(|figure| figures.show(figure)).collect();
     let no_map = if map.is_scan() {
         Some("The drones moved: what they measured is shown along their tracks.")
     } else if map.drones.iter().all(|drone| drone.position_m.is_none()) {
@@ -69,7 +99,7 @@ pub(super) fn air_section(
         context! { correlations, averaging, ..scales::section(found) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, alone, posterior => words::sentences(map), statistics, errors => errors::section(map) },
     )
 }
 

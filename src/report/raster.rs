@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use super::colour::diverging_rgb;
+use super::colour::{diverging_rgb, sequential_rgb};
 
 /// Palette entries for values; one more is transparent.
 const COLOURS: u8 = 254;
@@ -27,11 +27,26 @@ pub(super) enum Pixel {
 /// pixels. Empty if there is nothing to draw.
 pub(super) fn image(
     pixels: &[Pixel],
+    size: (usize, usize),
+    place: [f64; 4],
+    smooth: bool,
+) -> String {
+    coloured(pixels, size, place, smooth, diverging_rgb)
+}
+
+/// [`image`] of sizes: a pixel's position, 0..1, is one on the sequential scale.
+pub(super) fn image_of_sizes(pixels: &[Pixel], size: (usize, usize), place: [f64; 4]) -> String {
+    coloured(pixels, size, place, true, |place| sequential_rgb(place.max(0.0)))
+}
+
+fn coloured(
+    pixels: &[Pixel],
     (columns, rows): (usize, usize),
     [x, y, w, h]: [f64; 4],
     smooth: bool,
+    colour: fn(f64) -> [u8; 3],
 ) -> String {
-    let Some(bytes) = png(pixels, columns, rows) else { return String::new() };
+    let Some(bytes) = png(pixels, columns, rows, colour) else { return String::new() };
     let rendering = if smooth { "auto" } else { "pixelated" };
     format!(
         "<image x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" \
@@ -41,7 +56,12 @@ pub(super) fn image(
     )
 }
 
-fn png(pixels: &[Pixel], columns: usize, rows: usize) -> Option<Vec<u8>> {
+fn png(
+    pixels: &[Pixel],
+    columns: usize,
+    rows: usize,
+    colour: fn(f64) -> [u8; 3],
+) -> Option<Vec<u8>> {
     if pixels.is_empty() || pixels.len() != columns * rows {
         return None;
     }
@@ -58,7 +78,7 @@ fn png(pixels: &[Pixel], columns: usize, rows: usize) -> Option<Vec<u8>> {
         })
         .collect();
     let palette: Vec<u8> = (0..COLOURS)
-        .flat_map(|i| diverging_rgb(2.0 * f64::from(i) / f64::from(COLOURS - 1) - 1.0))
+        .flat_map(|i| colour(2.0 * f64::from(i) / f64::from(COLOURS - 1) - 1.0))
         .chain([0x9f, 0xa8, 0xb1, 255, 255, 255])
         .collect();
     let mut opaque = vec![255_u8; usize::from(EMPTY)];
@@ -91,7 +111,7 @@ mod tests {
             Pixel::Hatch,
             Pixel::At(f64::NAN),
         ];
-        let bytes = png(&pixels, 3, 2).unwrap();
+        let bytes = png(&pixels, 3, 2, diverging_rgb).unwrap();
         let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder.read_info().unwrap();

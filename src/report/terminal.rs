@@ -16,6 +16,7 @@ use super::fleet_air::fleet_air;
 use super::headline::{bent_cells, bent_line, held, held_cell, held_words};
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
+use super::posterior;
 use super::statistics_lines::statistics_lines;
 use super::table::{Align, Column, column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
@@ -378,6 +379,9 @@ impl Output {
                     count(known, "drone")
                 ),
             );
+        }
+        for sentence in posterior::sentences(map) {
+            self.wrapped("", "  ", &sentence);
         }
         for thermal in &map.thermals {
             self.wrapped("", "  ", &thermal.sentence());

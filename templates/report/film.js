@@ -9,7 +9,21 @@ for (const film of document.querySelectorAll(".film")) {
   };
   const estimate = decoded(data.estimate);
   const truth = data.truth ? decoded(data.truth) : null;
-  const difference = truth && estimate.map((w, i) => (w === NONE || truth[i] === NONE ? NONE : w - truth[i]));
+  const less = (values) => truth && values.map((w, i) => (w === NONE || truth[i] === NONE ? NONE : w - truth[i]));
+  const alone = { estimate, truth, difference: less(estimate), names: { estimate: "Estimated W*", difference: "W* − W" } };
+  // The posterior, if there is one: all drones, seconds and the calibration together.
+  const together = data.posterior && decoded(data.posterior.values);
+  const sd = data.posterior && decoded(data.posterior.sd);
+  const posterior = together && {
+    estimate: together,
+    truth,
+    difference: less(together),
+    names: { estimate: "Posterior W", difference: "Posterior W − W" },
+  };
+  const field = data.posterior?.field ?? null;
+  const cells = field && decoded(field.values);
+  const lost = data.posterior?.lost ?? [];
+  let shown = posterior || alone;
   const drones = data.places.length;
   const frames = data.times.length;
 
@@ -34,7 +48,7 @@ for (const film of document.querySelectorAll(".film")) {
   // The part of the ground that is shown, metres: forward is up, left is left.
   const known = data.places.filter(Boolean);
   const extent = (axis) => {
-    const all = known.map((p) => p[axis]);
+    const all = known.concat(lost).map((p) => p[axis]);
     return [all.reduce((a, b) => Math.min(a, b)), all.reduce((a, b) => Math.max(a, b))];
   };
   const [x, y] = [extent(0), extent(1)];
@@ -56,6 +70,69 @@ for (const film of document.querySelectorAll(".film")) {
   // Which triangle each pixel lies in, and where in it: worked out once.
   const columns = Math.max(1, Math.round((160 * wide) / Math.max(wide, tall)));
   const rows = Math.max(1, Math.round((160 * tall) / Math.max(wide, tall)));
+  // Where each pixel lies in the posterior's grid: the four cells around it, and how far between them.
+  const spots = field && (() => {
+    const between = (axis, v) => {
+      if (v < axis[0] || v > axis[axis.length - 1]) return null;
+      let low = 0;
+      while (low < axis.length - 2 && axis[low + 1] < v) low++;
+      return [low, (v - axis[low]) / (axis[low + 1] - axis[low])];
+    };
+    const down = Array.from({ length: rows }, (_, r) => between(field.x, forward[0] - ((r + 0.5) / rows) * tall));
+    const across = Array.from({ length: columns }, (_, k) => between(field.y, left[0] - ((k + 0.5) / columns) * wide));
+    return { down, across };
+  })();
+  // The grid at the time of a frame, mm/s, linear between its times; NaN is not known.
+  const gridAt = (s) => {
+    const n = field.x.length * field.y.length;
+    const times = field.times;
+    let low = 0;
+    while (low < times.length - 2 && times[low + 1] < s) low++;
+    const high = Math.min(low + 1, times.length - 1);
+    const share = high > low ? Math.max(0, Math.min(1, (s - times[low]) / (times[high] - times[low]))) : 0;
+    return Float32Array.from({ length: n }, (_, i) => {
+      const [a, b] = [cells[low * n + i], cells[high * n + i]];
+      return a === NONE || b === NONE ? NaN : a + share * (b - a);
+    });
+  };
+  const paintField = (out, limit) => {
+    const grid = gridAt(data.times[frame]);
+    const width = field.x.length;
+    for (let r = 0; r < rows; r++) {
+      for (let k = 0; k < columns; k++) {
+        const i = r * columns + k;
+        out[4 * i + 3] = 0;
+        const [along, aside] = [spots.down[r], spots.across[k]];
+        if (!along || !aside) continue;
+        const at = aside[0] * width + along[0];
+        const near = grid[at] + along[1] * (grid[at + 1] - grid[at]);
+        const far = grid[at + width] + along[1] * (grid[at + width + 1] - grid[at + width]);
+        const value = near + aside[1] * (far - near);
+        if (Number.isNaN(value)) continue;
+        const c = 3 * step(value, limit);
+        out[4 * i] = palette[c];
+        out[4 * i + 1] = palette[c + 1];
+        out[4 * i + 2] = palette[c + 2];
+        out[4 * i + 3] = 255;
+      }
+    }
+  };
+  // What is not known shows through as hatching.
+  const hatch = (pen, [x0, y0, w, h]) => {
+    pen.save();
+    pen.beginPath();
+    pen.rect(x0, y0, w, h);
+    pen.clip();
+    pen.strokeStyle = "#d3d9de";
+    pen.beginPath();
+    for (let at = -h; at < w; at += 8) {
+      pen.moveTo(x0 + at, y0 + h);
+      pen.lineTo(x0 + at + h, y0);
+    }
+    pen.stroke();
+    pen.restore();
+  };
+
   const corners = new Int32Array(3 * columns * rows).fill(-1);
   const weights = new Float32Array(2 * columns * rows);
   for (let t = 0; t < data.triangles.length; t += 3) {
@@ -95,7 +172,8 @@ for (const film of document.querySelectorAll(".film")) {
       canvas,
       small,
       pixels: new ImageData(columns, rows),
-      values: { estimate, truth, difference }[of],
+      of,
+      heading: canvas.closest(".screen").querySelector("h4"),
       limit: of === "difference" ? data.difference_limit : data.limit,
     };
   });
@@ -111,7 +189,9 @@ for (const film of document.querySelectorAll(".film")) {
     return all;
   };
   const draw = (screen) => {
-    const { canvas, values, limit } = screen;
+    const { canvas, limit } = screen;
+    const values = shown[screen.of];
+    const whole = field && shown === posterior && screen.of === "estimate" && !squares.checked;
     const ratio = window.devicePixelRatio || 1;
     const width = canvas.clientWidth;
     if (!width) return;
@@ -130,7 +210,10 @@ for (const film of document.querySelectorAll(".film")) {
     const down = (v) => pad.top + (forward[0] - v) * scale;
     screen.place = { across, down };
     const at = frame * drones;
-    if (data.triangles.length && !squares.checked) {
+    if (whole) {
+      hatch(pen, [pad.left, pad.top, wide * scale, tall * scale]);
+      paintField(screen.pixels.data, limit);
+    } else if (data.triangles.length && !squares.checked) {
       const out = screen.pixels.data;
       for (let i = 0; i < columns * rows; i++) {
         const a = corners[3 * i];
@@ -144,6 +227,8 @@ for (const film of document.querySelectorAll(".film")) {
         out[4 * i + 2] = palette[k + 2];
         out[4 * i + 3] = 255;
       }
+    }
+    if (whole || (data.triangles.length && !squares.checked)) {
       screen.small.getContext("2d").putImageData(screen.pixels, 0, 0);
       pen.imageSmoothingQuality = "high";
       pen.drawImage(screen.small, pad.left, pad.top, wide * scale, tall * scale);
@@ -161,12 +246,20 @@ for (const film of document.querySelectorAll(".film")) {
           pen.lineTo(px + 4, py + 4 * sign);
         }
         pen.stroke();
-      } else if (squares.checked || !data.triangles.length) {
+      } else if (!whole && (squares.checked || !data.triangles.length)) {
         pen.fillStyle = colour(value, limit);
         pen.fillRect(px - side / 2, py - side / 2, side, side);
       } else {
         pen.fillStyle = "rgba(31,41,51,0.45)";
         pen.fillRect(px - 1, py - 1, 2, 2);
+      }
+    }
+    if (whole) {
+      pen.strokeStyle = "rgba(31,41,51,0.6)";
+      for (const place of lost) {
+        pen.beginPath();
+        pen.arc(across(place[1]), down(place[0]), 3.5, 0, 2 * Math.PI);
+        pen.stroke();
       }
     }
     pen.strokeStyle = "#b4bcc4";
@@ -195,14 +288,20 @@ for (const film of document.querySelectorAll(".film")) {
     const at = frame * drones;
     if (pointed !== null) {
       const of = truth ? `, true ${signed(truth[at + pointed])}` : "";
-      reading.textContent = `${data.names[pointed]}: ${signed(estimate[at + pointed])}${of}`;
+      const own = signed(estimate[at + pointed]);
+      const known = posterior && together[at + pointed] !== NONE;
+      const error = known ? ` ± ${(sd[at + pointed] / 1000).toFixed(2)} m/s` : "";
+      const words = posterior
+        ? `posterior ${signed(together[at + pointed]).replace(known ? " m/s" : "", "")}${error}, alone ${own}`
+        : own;
+      reading.textContent = `${data.names[pointed]}: ${words}${of}`;
       return;
     }
-    const all = Array.from(estimate.subarray(at, at + drones)).filter((w) => w !== NONE);
+    const all = Array.from(shown.estimate.subarray(at, at + drones)).filter((w) => w !== NONE);
     const mean = all.length ? all.reduce((a, b) => a + b, 0) / all.length : NONE;
-    let text = `mean of ${all.length} drones ${signed(mean)}`;
-    if (difference) {
-      const off = Array.from(difference.subarray(at, at + drones)).filter((w) => w !== NONE);
+    let text = `${shown === posterior ? "posterior " : ""}mean of ${all.length} drones ${signed(mean)}`;
+    if (shown.difference) {
+      const off = Array.from(shown.difference.subarray(at, at + drones)).filter((w) => w !== NONE);
       const rms = Math.sqrt(off.reduce((a, b) => a + b * b, 0) / Math.max(1, off.length));
       text += `, rms error ${(rms / 1000).toFixed(2)} m/s`;
     }
@@ -259,6 +358,16 @@ for (const film of document.querySelectorAll(".film")) {
     now = data.times[frame];
   };
   button.addEventListener("click", toggle);
+  const choice = film.querySelector(".alone");
+  choice?.addEventListener("click", () => {
+    shown = shown === alone ? posterior : alone;
+    choice.setAttribute("aria-pressed", String(shown === alone));
+    for (const screen of screens) {
+      if (shown.names[screen.of]) screen.heading.textContent = shown.names[screen.of];
+      draw(screen);
+    }
+    read();
+  });
   slider.addEventListener("input", () => jump(Number(slider.value)));
   squares.addEventListener("change", () => screens.forEach(draw));
   film.addEventListener("keydown", (event) => {

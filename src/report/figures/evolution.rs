@@ -6,6 +6,7 @@ use crate::analysis::result::FlightAnalysis;
 use crate::report::Figure;
 use crate::report::colour::{FAINT, INK, MUTED, diverging};
 use crate::report::frames::Frames;
+use crate::report::posterior_grid::{Cells, GridField};
 use crate::report::raster::{Pixel, image};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, fixed};
@@ -22,20 +23,35 @@ const PITCH: f64 = 150.0;
 const LEFT: f64 = 26.0;
 /// Pixels of the field along a panel's longer side.
 const RASTER: f64 = 72.0;
+/// Every so many pixels of what is not known are grey, along diagonals.
+const HATCH: usize = 6;
 
 /// What a row shows.
 #[derive(Clone, Copy, PartialEq)]
 enum Of {
     Estimate,
+    Posterior,
     Truth,
 }
 
-/// The panels; `None` without places, times, or room for two rows. `wind_mps` is [forward, left].
+impl Of {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Estimate => "estimated W*",
+            Self::Posterior => "posterior W",
+            Self::Truth => "true W",
+        }
+    }
+}
+
+/// The panels; `None` without places, times, or room for two rows. `wind_mps` is [forward, left]; with `field` they show
+/// the posterior instead of each drone alone.
 pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     frames: &Frames<'_>,
     wind_mps: Option<[f64; 2]>,
+    field: Option<&GridField<'_>>,
 ) -> Option<Figure> {
     let (first, last) = (*frames.times.first()?, *frames.times.last()?);
     let span_s = frames.seconds(last) - frames.seconds(first);
@@ -47,32 +63,51 @@ pub(in crate::report) fn figure(
     let start_s = ((frames.seconds(first) + spare / 2.0) / fine_s).round() * fine_s;
     // The second row goes on from the first row's middle.
     let middle_s = start_s + 2.0 * coarse_s;
-    let mut rows = vec![(start_s, coarse_s, Of::Estimate), (middle_s, fine_s, Of::Estimate)];
+    let of = if field.is_some() { Of::Posterior } else { Of::Estimate };
+    let mut rows = vec![(start_s, coarse_s, of), (middle_s, fine_s, of)];
     if frames.truth_known {
         rows.insert(1, (start_s, coarse_s, Of::Truth));
         rows.push((middle_s, fine_s, Of::Truth));
     }
     let places: Vec<[f64; 2]> = frames.places.iter().flatten().copied().collect();
-    let tall = Projection::new(&places, [0.0, 0.0], [PANEL, PANEL], 0.3)?.size()[1];
+    let lost = frames.lost();
+    // The posterior reaches half a distance beyond the outermost drones.
+    let (ground, margin) = match field {
+        Some(field) => (field.corners().into_iter().chain(places.iter().copied()).collect(), 0.0),
+        None => (places.clone(), 0.3),
+    };
+    let projection = |origin| Projection::new(&ground, origin, [PANEL, PANEL], margin);
+    let tall = projection([0.0, 0.0])?.size()[1];
     let row_pitch = tall + 30.0;
     let height = 26.0 + row_pitch * rows.len() as f64;
     let mut drawing = Drawing::new(1040.0, height.max(220.0));
     for (row, (from_s, step_s, of)) in rows.iter().enumerate() {
         let top = 26.0 + row as f64 * row_pitch;
         let style = TextStyle { size: 13.0, bold: false, colour: MUTED, anchor: Anchor::Middle };
-        let name = if *of == Of::Estimate { "estimated W*" } else { "true W" };
-        drawing.text([16.0, top + tall / 2.0], name, style, -90.0);
+        drawing.text([16.0, top + tall / 2.0], of.words(), style, -90.0);
         for column in 0..COLUMNS {
             let origin = [LEFT + column as f64 * PITCH, top];
-            let projection = Projection::new(&places, origin, [PANEL, PANEL], 0.3)?;
+            let projection = projection(origin)?;
             let time = frames.closest(from_s + column as f64 * step_s)?;
-            panel(&mut drawing, &projection, frames, time, *of);
+            match field.filter(|_| *of == Of::Posterior) {
+                Some(field) => posterior_panel(
+                    &mut drawing,
+                    &projection,
+                    field,
+                    &field.at(frames.seconds(time)),
+                    frames.limit_mps,
+                ),
+                None => panel(&mut drawing, &projection, frames, time, *of),
+            }
             let style = TextStyle { size: 12.5, bold: true, colour: INK, anchor: Anchor::End };
             let words = format!("{} s", fixed(frames.seconds(time), 0));
             let right = origin[0] + projection.size()[0];
             drawing.text([right, top - 6.0], &words, style, 0.0);
             if row == 0 && column == 0 {
                 marks(&mut drawing, &projection, &places);
+                if field.is_some() {
+                    rings(&mut drawing, &projection, &lost);
+                }
                 if let Some(wind) = wind_mps {
                     arrow(&mut drawing, [origin[0], top - 10.0], wind);
                 }
@@ -81,14 +116,35 @@ pub(in crate::report) fn figure(
     }
     let bar = [LEFT + count * PITCH + 8.0, 26.0, 16.0, (height - 60.0).clamp(140.0, 320.0)];
     colour_bar(&mut drawing, bar, frames.limit_mps, "W (m/s, up positive)");
-    scale_bar(&mut drawing, &Projection::new(&places, [0.0; 2], [PANEL, PANEL], 0.3)?, height);
-    let name = format!("fig5-{key}");
-    let title =
-        format!("Evolution of the vertical air speed, {} (paper's Fig. 5)", clean(&flight.name));
+    scale_bar(&mut drawing, &projection([0.0; 2])?, height);
+    let name = match field {
+        Some(_) => format!("fig5-posterior-{key}"),
+        None => format!("fig5-{key}"),
+    };
+    let title = match field {
+        Some(_) => {
+            format!("Posterior map over time, {} (as the paper's Fig. 5)", clean(&flight.name))
+        }
+        None => {
+            format!("Evolution of the vertical air speed, {} (paper's Fig. 5)", clean(&flight.name))
+        }
+    };
     let truth = if frames.truth_known {
         " Below each row: the true air at the same drones and times."
     } else {
         ""
+    };
+    let (what, others) = match field {
+        Some(_) => (
+            "The air's 10 s means as all drones, seconds and the calibration together tell it; where \
+             it is not known, it is hatched.",
+            if lost.is_empty() { "" } else { ", rings those without a log" },
+        ),
+        None => (
+            "Running 10 s estimates, linear between the drones (Delaunay triangles), nothing outside \
+             their hull.",
+            "; grey ones have no value",
+        ),
     };
     let wind = if wind_mps.is_some() { " The arrow shows where the wind blows to." } else { "" };
     Some(Figure {
@@ -98,9 +154,8 @@ pub(in crate::report) fn figure(
         caption: format!(
             "The grid from above (forward is up), at the show times above the panels: {} s apart \
              in the first row, {} s in the second, which goes on from the third panel of the \
-             first. Running 10 s estimates, linear between the drones (Delaunay triangles), \
-             nothing outside their hull. One scale for all panels, white is still air. Crosses in \
-             the first panel are the drones; grey ones have no value.{truth}{wind}",
+             first. {what} One scale for all panels, white is still air. Crosses in \
+             the first panel are the drones{others}.{truth}{wind}",
             fixed(coarse_s, 0),
             fixed(fine_s, 0),
         ),
@@ -109,7 +164,7 @@ pub(in crate::report) fn figure(
 
 fn panel(drawing: &mut Drawing, projection: &Projection, frames: &Frames<'_>, time: usize, of: Of) {
     let value = |drone: usize| match of {
-        Of::Estimate => frames.estimate(drone, time),
+        Of::Estimate | Of::Posterior => frames.estimate(drone, time),
         Of::Truth => frames.truth(drone, time),
     };
     let [w, h] = projection.size();
@@ -139,8 +194,51 @@ fn panel(drawing: &mut Drawing, projection: &Projection, frames: &Frames<'_>, ti
     }
 }
 
+/// The field between the drones, hatched where it is not known.
+fn posterior_panel(
+    drawing: &mut Drawing,
+    projection: &Projection,
+    field: &GridField<'_>,
+    cells: &Cells,
+    limit_mps: f64,
+) {
+    let [w, h] = projection.size();
+    let [x, y] = projection.origin();
+    drawing.rect([x, y, w, h], "#ffffff", &format!("stroke=\"{FAINT}\""));
+    let (pixels, size) = pixels(projection, field, cells, limit_mps);
+    drawing.raw(&image(&pixels, size, [x, y, w, h], true));
+}
+
+/// A field as pixels of its share of `limit_mps`, with their columns and rows.
+pub(super) fn pixels(
+    projection: &Projection,
+    field: &GridField<'_>,
+    cells: &Cells,
+    limit_mps: f64,
+) -> (Vec<Pixel>, (usize, usize)) {
+    let [w, h] = projection.size();
+    let side = |side: f64| ((side / w.max(h) * RASTER).round() as usize).max(1);
+    let size = (side(w), side(h));
+    let raster = field.raster(cells, size, projection.ranges());
+    let pixels = raster.into_iter().enumerate().map(|(index, value)| match value {
+        Some(w) => Pixel::At(w / limit_mps),
+        None if (index / size.0 + index % size.0).is_multiple_of(HATCH) => Pixel::Hatch,
+        None => Pixel::Empty,
+    });
+    (pixels.collect(), size)
+}
+
+/// Rings where drones would be that have no log.
+pub(super) fn rings(drawing: &mut Drawing, projection: &Projection, places: &[[f64; 2]]) {
+    for place in places {
+        let [x, y, side, _] = projection.cell(*place);
+        let r = (side * 0.14).clamp(1.0, 3.5);
+        drawing.disc([x + side / 2.0, y + side / 2.0], r, "none", INK);
+    }
+}
+
 /// Small crosses where the drones are.
-fn marks(drawing: &mut Drawing, projection: &Projection, places: &[[f64; 2]]) {
+pub(super) fn marks(drawing: &mut Drawing, projection: &Projection, places: &[[f64; 2]]) {
     for place in places {
         let [x, y, side, _] = projection.cell(*place);
         let (x, y, r) = (x + side / 2.0, y + side / 2.0, (side * 0.14).clamp(0.8, 3.0));

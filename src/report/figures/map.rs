@@ -1,8 +1,9 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
-use super::air::mean_truth;
+use super::air::{mean, mean_truth};
 use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
-use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, UpdraftMap};
+use crate::base::estimate::Estimate;
 use crate::report::Figure;
 use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
@@ -11,18 +12,52 @@ use crate::report::text::{clean, count, estimate, fixed, signed, usable};
 /// Above so many drones the cells are too small for text.
 const TEXT_LIMIT: usize = 400;
 
+/// Whose means the squares show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::report) enum Means {
+    /// Each drone's own.
+    Alone,
+    /// Those of the posterior.
+    Posterior,
+}
+
+impl Means {
+    fn of(self, drone: &DroneUpdraft) -> Estimate {
+        match self {
+            Self::Alone => drone.mean,
+            Self::Posterior => drone.posterior_mean.unwrap_or(Estimate::new(f64::NAN, f64::NAN)),
+        }
+    }
+
+    fn symbol(self) -> &'static str {
+        match self {
+            Self::Alone => "W*",
+            Self::Posterior => "posterior W",
+        }
+    }
+}
+
 /// The map of mean updrafts; `None` if no drone has a position. `key` names the flight in files.
 pub(in crate::report) fn mean_map(
     analysis: &Analysis,
     flight: &FlightAnalysis,
     key: &str,
     map: &UpdraftMap,
+    means: Means,
 ) -> Option<Figure> {
     let mut positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
     if positions.is_empty() {
         return None;
     }
-    let known = empty_places(analysis, flight);
+    let filled: Vec<(&FilledDrone, f64)> = match (&map.posterior, means) {
+        (Some(posterior), Means::Posterior) => posterior.filled.iter().filter_map(filled).collect(),
+        _ => Vec::new(),
+    };
+    let known: Vec<(u16, [f64; 2])> = empty_places(analysis, flight)
+        .into_iter()
+        .filter(|(slot, _)| filled.iter().all(|(drone, _)| drone.slot != *slot))
+        .collect();
+    positions.extend(filled.iter().map(|(drone, _)| drone.position_m));
     positions.extend(known.iter().map(|(_, home)| *home));
     let mut empty: Vec<(Option<u16>, [f64; 2])> =
         known.into_iter().map(|(slot, home)| (Some(slot), home)).collect();
@@ -37,13 +72,17 @@ pub(in crate::report) fn mean_map(
     let projection = Projection::new(&positions, [70.0, top], room, 0.5)?;
     let [width, height] = projection.size();
     let limit = limit(
-        map.drones.iter().map(|drone| drone.mean.value).chain(truths.iter().copied().flatten()),
+        map.drones
+            .iter()
+            .map(|drone| means.of(drone).value)
+            .chain(filled.iter().map(|(_, mean)| *mean))
+            .chain(truths.iter().copied().flatten()),
     );
     let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
     let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
     let with_text = positions.len() <= TEXT_LIMIT;
     // As many decimals as the largest error asks for, the same in all cells.
-    let largest = map.drones.iter().map(|drone| drone.mean.se).filter(|se| usable(*se));
+    let largest = map.drones.iter().map(|drone| means.of(drone).se).filter(|se| usable(*se));
     let decimals = with_text.then(|| error_decimals(largest.fold(0.0, f64::max)));
     for (slot, home) in &empty {
         empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
@@ -51,8 +90,11 @@ pub(in crate::report) fn mean_map(
     for drone in &map.drones {
         if let Some(place) = position(drone) {
             let cell = projection.cell(place);
-            mean_cell(&mut drawing, drone, cell, limit, decimals);
+            mean_cell(&mut drawing, drone, means.of(drone), cell, limit, decimals);
         }
+    }
+    for (drone, mean) in &filled {
+        filled_cell(&mut drawing, drone, *mean, projection.cell(drone.position_m), limit, decimals);
     }
     axes(&mut drawing, &projection);
     if truth_known {
@@ -65,7 +107,11 @@ pub(in crate::report) fn mean_map(
                 true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, decimals);
             }
         }
-        for (projection, words) in [(&projection, "estimated W*"), (&aside, "true W")] {
+        let estimated = match means {
+            Means::Alone => "estimated W*",
+            Means::Posterior => means.symbol(),
+        };
+        for (projection, words) in [(&projection, estimated), (&aside, "true W")] {
             let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
             drawing.text([projection.origin()[0], top - 12.0], words, style, 0.0);
         }
@@ -76,15 +122,37 @@ pub(in crate::report) fn mean_map(
         &mut drawing,
         bar,
         limit,
-        if truth_known { "mean W* and W (m/s)" } else { "mean updraft W* (m/s)" },
+        match (truth_known, means) {
+            (true, Means::Alone) => "mean W* and W (m/s)",
+            (false, Means::Alone) => "mean updraft W* (m/s)",
+            (_, Means::Posterior) => "mean W (m/s)",
+        },
     );
-    let name = format!("map-{key}");
-    let title = format!("Mean vertical air speed over the grid, {}", clean(&flight.name));
+    let flight_name = clean(&flight.name);
+    let (name, title) = match means {
+        Means::Alone => {
+            (format!("map-{key}"), format!("Mean vertical air speed over the grid, {flight_name}"))
+        }
+        Means::Posterior => (
+            format!("posterior-{key}"),
+            format!("Posterior mean of the vertical air speed over the grid, {flight_name}"),
+        ),
+    };
     let dashed = if empty.is_empty() { "" } else { " Dashed squares are drones without data." };
     let beside = if truth_known {
         " Right: the mean of the true air at the same drones and times, on the same scale."
     } else {
         ""
+    };
+    let (what, lost) = match (means, filled.len()) {
+        (Means::Alone, _) => ("", ""),
+        (Means::Posterior, 0) => {
+            (", as all drones, seconds and the calibration together tell it", "")
+        }
+        (Means::Posterior, _) => (
+            ", as all drones, seconds and the calibration together tell it",
+            " Dotted frames are drones without a log, whose air their neighbours tell.",
+        ),
     };
     Some(Figure {
         svg: drawing.finish(&title),
@@ -92,9 +160,9 @@ pub(in crate::report) fn mean_map(
         title,
         caption: format!(
             "The grid seen from above, one square for each of {}: the mean vertical air speed \
-             over the hover with its standard error below, m/s, up positive. Red is rising air, \
-             blue sinking, white none; the small number is the slot.{beside}{dashed}",
-            count(positions.len() - empty.len(), "drone"),
+             over the hover{what} with its standard error below, m/s, up positive. Red is rising air, \
+             blue sinking, white none; the small number is the slot.{beside}{lost}{dashed}",
+            count(positions.len() - empty.len() - filled.len(), "drone"),
         ),
     })
 }
@@ -142,33 +210,64 @@ fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], 
     drawing.close();
 }
 
-fn mean_cell(
+/// A drone without a log, with the mean of its posterior over time.
+fn filled(drone: &FilledDrone) -> Option<(&FilledDrone, f64)> {
+    let known = drone.posterior_mps.iter().flatten().copied();
+    let [x, y] = drone.position_m;
+    Some((drone, mean(known).filter(|_| usable(x) && usable(y))?))
+}
+
+fn filled_cell(
     drawing: &mut Drawing,
-    drone: &DroneUpdraft,
+    drone: &FilledDrone,
+    mean: f64,
     [x, y, w, h]: [f64; 4],
     limit: f64,
     decimals: Option<usize>,
 ) {
-    let place = drone.mean.value / limit;
-    let fill = if usable(drone.mean.value) { diverging(place) } else { "#ffffff".to_owned() };
+    let place = mean / limit;
+    let label = drone.slot.to_string();
+    drawing.open(&format!("slot {label}: {} m/s, by its neighbours", signed(mean, 3)));
+    let frame = format!("rx=\"2\" stroke=\"{INK}\" stroke-dasharray=\"2 3\"");
+    drawing.rect([x + 2.0, y + 2.0, w - 4.0, h - 4.0], &diverging(place), &frame);
+    if let Some(decimals) = decimals {
+        let colour = ink_on_diverging(place);
+        let style = |size, bold, anchor| TextStyle { size, bold, colour, anchor };
+        let middle = [x + w / 2.0, y + h * 0.56];
+        let text = signed(mean, decimals);
+        drawing.text(middle, &text, style((w * 0.23).min(20.0), true, Anchor::Middle), 0.0);
+        let below = [x + w / 2.0, y + h * 0.79];
+        drawing.text(below, "no log", style((w * 0.155).min(13.0), false, Anchor::Middle), 0.0);
+        let corner = [x + w * 0.07, y + h * 0.2];
+        drawing.text(corner, &label, style((w * 0.13).min(10.0), false, Anchor::Start), 0.0);
+    }
+    drawing.close();
+}
+
+fn mean_cell(
+    drawing: &mut Drawing,
+    drone: &DroneUpdraft,
+    mean: Estimate,
+    [x, y, w, h]: [f64; 4],
+    limit: f64,
+    decimals: Option<usize>,
+) {
+    let place = mean.value / limit;
+    let fill = if usable(mean.value) { diverging(place) } else { "#ffffff".to_owned() };
     drawing.open(&format!(
         "{}: {} m/s, {} mapping",
         clean(&drone.name),
-        estimate(drone.mean),
+        estimate(mean),
         drone.mapping.name(),
     ));
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
     if let Some(decimals) = decimals {
-        let colour = if usable(drone.mean.value) { ink_on_diverging(place) } else { MUTED };
+        let colour = if usable(mean.value) { ink_on_diverging(place) } else { MUTED };
         let style = |size: f64, bold| TextStyle { size, bold, colour, anchor: Anchor::Middle };
-        let text = if usable(drone.mean.value) {
-            signed(drone.mean.value, decimals)
-        } else {
-            "n/a".to_owned()
-        };
+        let text = if usable(mean.value) { signed(mean.value, decimals) } else { "n/a".to_owned() };
         drawing.text([x + w / 2.0, y + h * 0.56], &text, style((w * 0.23).min(20.0), true), 0.0);
-        if usable(drone.mean.se) && drone.mean.se > 0.0 {
-            let text = format!("±{}", fixed(drone.mean.se, decimals));
+        if usable(mean.se) && mean.se > 0.0 {
+            let text = format!("±{}", fixed(mean.se, decimals));
             let at = [x + w / 2.0, y + h * 0.79];
             drawing.text(at, &text, style((w * 0.155).min(13.0), false), 0.0);
         }

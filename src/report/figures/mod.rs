@@ -11,5 +11,6 @@ pub(super) mod laws;
 pub(super) mod levelled;
 pub(super) mod map;
 mod plan_view;
+pub(super) mod posterior;
 pub(super) mod study;
 pub(super) mod track;

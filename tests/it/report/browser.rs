@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::report::chromium::{Browser, Key, Tab};
-use crate::report::synthetic::{provenance, whole_campaign};
+use crate::report::synthetic::{posterior, provenance, whole_campaign};
 use updraft::report::{render, render_gap, write};
 
 /// Writes the synthetic campaign's report; the page's address and the folder of screenshots.
@@ -77,6 +77,34 @@ fn the_report_works_in_a_browser() {
     let address_now = tab.text("location.href.split('#')[0]");
     assert_eq!(address_now, address, "the page did not leave");
 
+    tab.whole_page(&folder.join("page.png"));
+    tab.finish();
+}
+
+#[test]
+fn the_film_shows_the_posterior_and_at_a_click_each_drone_alone() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-browser").join("posterior");
+    let made = render(&posterior(whole_campaign()), &provenance()).expect("a report");
+    write(&made, &folder).expect("written");
+    let address = format!("file://{}", folder.join("index.html").display());
+    let mut tab = browser.open(&address, [1280, 900]);
+    let heading = "document.querySelector('.film h4').textContent";
+    let reading = "document.querySelector('.film .reading').textContent";
+    let picture = "document.querySelector('.film canvas').toDataURL()";
+    assert_eq!(tab.text(heading), "Posterior W");
+    assert!(tab.text(reading).contains("drones −0.12 m/s"), "{}", tab.text(reading));
+    let together = tab.text(picture);
+    tab.run(
+        "document.querySelector('.film').scrollIntoView({ block: 'center', behavior: 'instant' })",
+    );
+    tab.screenshot(&folder.join("film.png"));
+    tab.click_on(".film .alone");
+    assert_eq!(tab.text(heading), "Estimated W*");
+    assert!(tab.text(picture) != together, "the picture has not changed");
+    tab.click_on(".film .alone");
+    assert_eq!(tab.text(heading), "Posterior W");
+    assert_eq!(tab.text(picture), together, "and back");
     tab.whole_page(&folder.join("page.png"));
     tab.finish();
 }

@@ -4,6 +4,7 @@
 
 #![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
 
+mod posterior;
 mod whole;
 
 use std::f64::consts::TAU;
@@ -24,6 +25,8 @@ use updraft::mission::plan::{Purpose, SegmentKind};
 use updraft::report::{InputFile, Provenance};
 
 #[allow(unused_imports, reason = "each test binary uses a part")]
+#[allow(unused_imports, reason = "each test binary uses a part")]
+pub(crate) use posterior::posterior;
 pub(crate) use whole::whole_campaign;
 
 /// The paper's simulated law.

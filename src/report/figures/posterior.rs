@@ -1,0 +1,92 @@
+//! The posterior map over the whole flight: its mean between the drones, and how well it is known there.
+
+use super::evolution::{marks, pixels, rings};
+use super::plan_view::{Projection, axes, narrow_bar};
+use crate::analysis::result::FlightAnalysis;
+use crate::report::Figure;
+use crate::report::axis::{decimals_of, nice_step};
+use crate::report::colour::{INK, diverging, sequential};
+use crate::report::frames::Frames;
+use crate::report::posterior_grid::{Cells, GridField};
+use crate::report::raster::{image, image_of_sizes};
+use crate::report::svg::{Anchor, Drawing, TextStyle};
+use crate::report::text::{clean, fixed, signed};
+
+/// Largest sides of a panel, pixels.
+const ROOM: [f64; 2] = [380.0, 380.0];
+const TOP: f64 = 40.0;
+const LEFT: f64 = 70.0;
+/// From one panel's right edge to the next one's left: the bar with its numbers.
+const GAP: f64 = 150.0;
+
+/// Mean and standard deviation beside each other; `None` where nothing is known.
+pub(in crate::report) fn figure(
+    flight: &FlightAnalysis,
+    key: &str,
+    frames: &Frames<'_>,
+    field: &GridField<'_>,
+) -> Option<Figure> {
+    let (mean, sd) = (field.mean(), field.sd());
+    let mean_limit = limit(&mean)?;
+    let sd_limit = limit(&sd)?;
+    let places: Vec<[f64; 2]> = frames.places.iter().flatten().copied().collect();
+    let lost = frames.lost();
+    let ground: Vec<[f64; 2]> = field.corners().into_iter().chain(places.clone()).collect();
+    let [width, height] = Projection::new(&ground, [0.0; 2], ROOM, 0.0)?.size();
+    let lefts = [LEFT, LEFT + width + GAP];
+    let mut drawing = Drawing::new(lefts[1] + width + 90.0, TOP + height + 58.0);
+    for (index, left) in lefts.into_iter().enumerate() {
+        let projection = Projection::new(&ground, [left, TOP], ROOM, 0.0)?;
+        let place = [left, TOP, width, height];
+        let is_mean = index == 0;
+        let (cells, limit) = if is_mean { (&mean, mean_limit) } else { (&sd, sd_limit) };
+        let (pixels, size) = pixels(&projection, field, cells, limit);
+        drawing.raw(&if is_mean {
+            image(&pixels, size, place, true)
+        } else {
+            image_of_sizes(&pixels, size, place)
+        });
+        marks(&mut drawing, &projection, &places);
+        rings(&mut drawing, &projection, &lost);
+        if is_mean {
+            axes(&mut drawing, &projection);
+        }
+        let words = if is_mean {
+            "(a) Mean over the flight (m/s)"
+        } else {
+            "(b) Standard deviation at one time (m/s)"
+        };
+        let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
+        drawing.text([left, TOP - 12.0], words, style, 0.0);
+        let bar = [left + width + 14.0, TOP, 14.0, height.min(320.0)];
+        let decimals = decimals_of(limit / 2.0);
+        if is_mean {
+            let ticks = [0.0, 0.25, 0.5, 0.75, 1.0]
+                .map(|place| (place, signed((2.0 * place - 1.0) * limit, decimals)));
+            narrow_bar(&mut drawing, bar, |place| diverging(2.0 * place - 1.0), &ticks);
+        } else {
+            let ticks = [0.0, 0.5, 1.0].map(|place| (place, fixed(place * limit, decimals)));
+            narrow_bar(&mut drawing, bar, sequential, &ticks);
+        }
+    }
+    let name = format!("posterior-field-{key}");
+    let title = format!("Posterior map between the drones, {}", clean(&flight.name));
+    let rings = if lost.is_empty() { "" } else { ", rings those without a log" };
+    Some(Figure {
+        svg: drawing.finish(&title),
+        name,
+        title,
+        caption: format!(
+            "(a) Mean of the posterior over the flight, from above, forward is up; red is rising air. (b) Its standard \
+             deviation for the mean of 10 s at one time, root mean square over the flight: all origins of error are in \
+             it, also those that all places share. Crosses are drones{rings}; hatched: not known."
+        ),
+    })
+}
+
+/// A round number around all sizes; `None` without any.
+fn limit(cells: &Cells) -> Option<f64> {
+    let largest = cells.iter().flatten().flatten().map(|w| w.abs()).reduce(f64::max)?.max(0.01);
+    let step = nice_step(largest / 5.0);
+    Some((largest / step).ceil() * step)
+}
