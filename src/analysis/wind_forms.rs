@@ -131,7 +131,7 @@ impl WindForms {
     }
 
     /// Changes of the pulse by lean and climb, us.
-    fn by_lean(&self, response: &Response) -> Vec<Vec<f64>> {
+    fn by_lean(response: &Response) -> Vec<Vec<f64>> {
         let change = |step: usize, climb: usize| {
             let tangent = (step as f64 * LEAN_STEP_DEG).to_radians().tan();
             let place = place_in(&response.lean[climb], tangent);
@@ -161,13 +161,13 @@ impl WindForms {
     pub(super) fn table(&self, belief: &Belief) -> LeanTable {
         let at = |doubts: &DVector<f64>| self.file.plus(&self.doubts, doubts);
         let middle = at(&belief.mean);
-        let change_us = self.by_lean(&middle);
+        let change_us = Self::by_lean(&middle);
         let eigen = SymmetricEigen::new(belief.covariance.clone());
         let mut moved: Vec<Vec<Vec<f64>>> = Vec::new();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             let step = vector * value.max(0.0).sqrt();
-            let more = self.by_lean(&at(&(&belief.mean + &step)));
-            let less = self.by_lean(&at(&(&belief.mean - &step)));
+            let more = Self::by_lean(&at(&(&belief.mean + &step)));
+            let less = Self::by_lean(&at(&(&belief.mean - &step)));
             moved.push(combined(&[more, less], &[0.5, -0.5]));
         }
         moved.push(combined(std::slice::from_ref(&change_us), &[FORM_SHARE]));
@@ -239,7 +239,9 @@ fn directions(
             };
             let (whole, told) = (square(moved), square(&found));
             let wider = if told > 0.0 { (whole / told).sqrt().min(MOST_WIDER) } else { 1.0 };
-            found.iter_mut().for_each(|table| table[lean][climb] *= wider);
+            for table in &mut found {
+                table[lean][climb] *= wider;
+            }
         }
     }
     found

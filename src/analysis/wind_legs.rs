@@ -227,7 +227,7 @@ fn noise_us(drones: &[DroneAnalysis]) -> f64 {
             .find(|next| (next.2 - height_m).abs() < NEAR_M && next.0 < time_s + 2.0 * NEAR_S);
         squares.extend(next.map(|next| (next.1 - pulse_us).powi(2) / 2.0));
     }
-    mean(squares.into_iter()).unwrap_or_default().sqrt().max(LEAST_NOISE_US)
+    mean(squares).unwrap_or_default().sqrt().max(LEAST_NOISE_US)
 }
 
 /// The search: doubts of the forms, then the wind along show x and y.
@@ -325,8 +325,8 @@ impl Fit<'_> {
         Some((normal, right))
     }
 
-    fn descend(&self, start: DVector<f64>) -> Option<(DVector<f64>, f64)> {
-        let (mut at, mut cost) = (start.clone(), self.cost(&start).0);
+    fn descend(&self, start: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
+        let (mut at, mut cost) = (start.clone(), self.cost(start).0);
         let mut damping = 1e-3;
         for _ in 0..STEPS {
             let (mut normal, mut right) = self.normal(&at)?;
@@ -370,7 +370,7 @@ impl Fit<'_> {
             }
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let ends = starts.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.descend(start));
+        let ends = starts.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.descend(&start));
         let (at, _) = ends.min_by(|a, b| a.1.total_cmp(&b.1))?;
         // Legs that scatter by more than they should tell less.
         let free = (2 * self.legs.legs.len() + 1).saturating_sub(2).max(1) as f64;
