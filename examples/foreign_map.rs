@@ -22,7 +22,7 @@ use updraft::workflow::analyze::{Analysing, Settings};
 use updraft::workflow::find::{Work, find};
 use updraft::workflow::host::Quiet;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() {
     let mut kinds: BTreeMap<String, Vec<Row>> = BTreeMap::new();
     println!("{HEAD}");
     for folder in std::env::args().skip(1) {
@@ -41,7 +41,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (kind, rows) in kinds {
         println!("{kind:18} {}", Row::mean(&rows).words());
     }
-    Ok(())
 }
 
 const HEAD: &str = "                     zero  plain inside | found   bias  rest inside width means filled  rms |  limit   at it ratio | length time";

@@ -21,12 +21,15 @@ pub(super) fn keys_of(asked: &str, texts: &[&str]) -> String {
     parameters.sort();
     parameters.dedup();
     let first = asked.split('.').next().unwrap_or(asked);
-    let known = parameters.iter().map(String::as_str).chain(TOP_LEVEL);
-    let nearest = known
-        .map(|key| (slips(first, key), key))
-        .filter(|(slips, key)| *slips <= MAX_SLIPS.min(key.len() / 2))
-        .min();
-    let hint = nearest.map_or(String::new(), |(_, key)| format!("did you mean {key}? "));
+    // Without a point a parameter is meant rather than a section.
+    let farther = usize::from(!asked.contains('.'));
+    let parameter = parameters.iter().map(|key| (key.as_str(), 0));
+    let nearest = parameter
+        .chain(TOP_LEVEL.into_iter().map(|key| (key, farther)))
+        .map(|(key, farther)| (slips(first, key), farther, key))
+        .filter(|(slips, _, key)| *slips <= MAX_SLIPS.min(key.len() / 2))
+        .min_by_key(|(slips, farther, key)| (slips + farther, *farther, *key));
+    let hint = nearest.map_or(String::new(), |(_, _, key)| format!("did you mean {key}? "));
     let parameters = if parameters.is_empty() {
         String::new()
     } else {

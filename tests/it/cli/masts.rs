@@ -1,6 +1,7 @@
 //! `updraft analyze --csv --zero --vehicle`: a camera drone beside a mast with sonic anemometers, and what is said to
 //! those who ask for a zero that there is not.
 
+use std::fmt::Write as _;
 use std::fs;
 
 use insta::assert_snapshot;
@@ -128,7 +129,7 @@ fn a_zero_that_there_is_not_is_refused_with_what_to_do() {
         &["campaign", "--vehicle", "phantom4"],
     ] {
         let ended = bench.expect(2, &[&["analyze", "--no-report"], args].concat());
-        told.push_str(&format!("{}\n{}\n", args.join(" "), ended.err.trim()));
+        writeln!(told, "{}\n{}", args.join(" "), ended.err.trim()).unwrap();
     }
     assert_snapshot!(told);
 }

@@ -94,7 +94,10 @@ fn parquet_has_the_posterior_as_the_csv_has_it() {
             .get_row_iter(None)
             .unwrap()
             .map(|row| {
-                row.unwrap().get_column_iter().map(|(_, field)| format!("{field} ")).collect()
+                let row = row.unwrap();
+                let fields: Vec<String> =
+                    row.get_column_iter().map(|(_, field)| field.to_string()).collect();
+                fields.join(" ") + " "
             })
             .collect();
         (names, rows)

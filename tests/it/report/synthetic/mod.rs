@@ -25,7 +25,6 @@ use updraft::mission::plan::{Purpose, SegmentKind};
 use updraft::report::{InputFile, Provenance};
 
 #[allow(unused_imports, reason = "each test binary uses a part")]
-#[allow(unused_imports, reason = "each test binary uses a part")]
 pub(crate) use posterior::posterior;
 pub(crate) use whole::whole_campaign;
 
