@@ -91,7 +91,7 @@ fn scale_words(scales: &AirScales) -> String {
         clean(&scales.form),
         fixed(scales.sd_mps, 2),
         fixed(scales.gust_mps, 2),
-        fixed(scales.gust_s, if scales.gust_s < 10.0 { 1 } else { 0 }),
+        fixed(scales.gust_s, usize::from(scales.gust_s < 10.0)),
     )
 }
 

@@ -79,7 +79,7 @@ impl<'a> GridField<'a> {
                 .filter(|value| usable(*value))
                 .map(inner)
                 .collect();
-            crate::numeric::mean(known.into_iter()).map(outer)
+            crate::numeric::mean(known).map(outer)
         };
         (0..self.grid.y_m.len())
             .map(|row| (0..self.grid.x_m.len()).map(|column| cell(row, column)).collect())
