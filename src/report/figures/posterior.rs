@@ -59,13 +59,13 @@ pub(in crate::report) fn figure(
         let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
         drawing.text([left, TOP - 12.0], words, style, 0.0);
         let bar = [left + width + 14.0, TOP, 14.0, height.min(320.0)];
-        let decimals = decimals_of(limit / 2.0);
         if is_mean {
+            let decimals = decimals_of(limit / 2.0);
             let ticks = [0.0, 0.25, 0.5, 0.75, 1.0]
                 .map(|place| (place, signed((2.0 * place - 1.0) * limit, decimals)));
             narrow_bar(&mut drawing, bar, |place| diverging(2.0 * place - 1.0), &ticks);
         } else {
-            let ticks = [0.0, 0.5, 1.0].map(|place| (place, fixed(place * limit, decimals)));
+            let ticks = [0.0, 1.0].map(|place| (place, fixed(place * limit, decimals_of(limit))));
             narrow_bar(&mut drawing, bar, sequential, &ticks);
         }
     }
