@@ -120,6 +120,7 @@ pub(super) fn add(
             drift_mps: found.air.drift_mps,
             gust_mps: found.air.gust_mps,
             gust_s: found.air.gust_s,
+            slow_mps: found.air.slow_mps,
         }),
         no_scales: (!adequate).then(|| found.adequacy.sentence()),
         zero_shift_mps: found.zero_shift_mps,
@@ -154,6 +155,7 @@ fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
             },
             gust_mps: 0.0,
             gust_s: 1.0,
+            slow_mps: 0.0,
         });
     }
     for gust in gusts {
@@ -173,6 +175,7 @@ const STILL: Air = Air {
     drift_mps: [0.0; 2],
     gust_mps: 0.0,
     gust_s: 1.0,
+    slow_mps: 0.0,
 };
 
 /// Gives all values the fleet's mean of what an error of its law adds to them.

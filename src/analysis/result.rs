@@ -393,6 +393,9 @@ pub struct AirScales {
     pub gust_mps: f64,
     /// Their time scale, s.
     pub gust_s: f64,
+    /// Standard deviation of slow air besides, which varies over 145 m and 186 s, m/s.
+    #[serde(default)]
+    pub slow_mps: f64,
 }
 
 /// A scale with its uncertainty.

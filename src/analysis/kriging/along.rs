@@ -61,6 +61,7 @@ mod tests {
             drift_mps,
             gust_mps: 0.0,
             gust_s: 4.0,
+            slow_mps: 0.0,
         })
     }
 

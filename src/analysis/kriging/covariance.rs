@@ -32,6 +32,12 @@ impl Form {
     }
 }
 
+/// Length of the slow part of air that varies on two scales, m: that of updrafts over a field (docs/physics.md, 4.1). One
+/// field would take the scale of the gusts that it shows most of, and know the zero by hundreds of them.
+const SLOW_M: f64 = 145.0;
+/// Its time, s.
+const SLOW_S: f64 = 186.0;
+
 /// Scales of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct Air {
@@ -51,18 +57,24 @@ pub(in super::super) struct Air {
     pub(in super::super) gust_mps: f64,
     /// Their time scale, s.
     pub(in super::super) gust_s: f64,
+    /// Standard deviation of slow air besides, m/s: an exponential field of [`SLOW_M`] and [`SLOW_S`].
+    pub(in super::super) slow_mps: f64,
 }
 
 impl Air {
     /// How long the field stays the same at one place, s: its integral time, by its own changes and by what drifts past.
     pub(super) fn stays_s(&self) -> f64 {
         let [u, v] = self.drift_mps;
-        let rate = (1.0 / self.time_s).hypot(u.hypot(v) / self.length_m);
+        let drift_mps = u.hypot(v);
+        let stays = |time_s: f64, length_m: f64| 1.0 / (1.0 / time_s).hypot(drift_mps / length_m);
         let integral = match self.form {
             Form::Exponential => 1.0,
             Form::Gaussian => 0.5 * std::f64::consts::PI.sqrt(),
         };
-        integral / rate
+        let [fast, slow] = [self.sd_mps, self.slow_mps].map(|sd| sd * sd);
+        let sum =
+            fast * integral * stays(self.time_s, self.length_m) + slow * stays(SLOW_S, SLOW_M);
+        if fast + slow > 0.0 { sum / (fast + slow) } else { 0.0 }
     }
 }
 
@@ -118,8 +130,10 @@ impl Covariance {
         let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
         let still = u == 0.0 && v == 0.0;
         let variance = sd_mps * sd_mps;
+        let slow = self.slow(apart_m, apart_s);
         if still && form == Form::Exponential {
-            return variance * (-self.distance(apart_m)).exp() * mean_exponential(apart_s, time_s);
+            return variance * (-self.distance(apart_m)).exp() * mean_exponential(apart_s, time_s)
+                + slow;
         }
         let mut sum = 0.0;
         for (node, weight) in NODES {
@@ -132,20 +146,32 @@ impl Covariance {
                     Form::Gaussian => (-r * r - t * t).exp(),
                 };
         }
-        variance * sum
+        variance * sum + slow
+    }
+
+    /// Covariance of the slow part, which means over 10 s do not change, (m/s)².
+    fn slow(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+        let Air { slow_mps, drift_mps: [u, v], .. } = self.air;
+        if slow_mps == 0.0 {
+            return 0.0;
+        }
+        let (x, y) = (x - u * apart_s, y - v * apart_s);
+        slow_mps
+            * slow_mps
+            * (-(x * x + y * y + z * z).sqrt() / SLOW_M - apart_s.abs() / SLOW_S).exp()
     }
 
     /// Covariance of the field itself, not of means, (m/s)².
-    pub(super) fn instant(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+    pub(super) fn instant(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
+        let [x, y, z] = apart_m;
         let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
         let r = self.distance([x - u * apart_s, y - v * apart_s, z]);
         let t = apart_s.abs() / time_s;
-        sd_mps
-            * sd_mps
-            * match form {
-                Form::Exponential => (-r - t).exp(),
-                Form::Gaussian => (-r * r - t * t).exp(),
-            }
+        let correlation = match form {
+            Form::Exponential => (-r - t).exp(),
+            Form::Gaussian => (-r * r - t * t).exp(),
+        };
+        sd_mps * sd_mps * correlation + self.slow(apart_m, apart_s)
     }
 
     /// Covariance of a drone's own gusts, (m/s)².
@@ -191,6 +217,7 @@ mod tests {
             drift_mps: [0.0; 2],
             gust_mps: 0.2,
             gust_s: 4.0,
+            slow_mps: 0.0,
         }
     }
 

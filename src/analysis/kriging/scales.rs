@@ -11,7 +11,7 @@ use super::vecchia::{Common, CommonVector, System};
 use crate::numeric::{differences, minimise};
 
 /// Scales that are searched, mostly as logarithms.
-pub(super) const SCALES: usize = 8;
+pub(super) const SCALES: usize = 9;
 pub(super) const LN_SD: usize = 0;
 pub(super) const LN_LENGTH: usize = 1;
 const STRETCH_ALONG: usize = 2;
@@ -21,6 +21,8 @@ pub(super) const LN_TIME: usize = 4;
 pub(super) const DRIFT: usize = 5;
 pub(super) const LN_GUST: usize = 6;
 const LN_GUST_TIME: usize = 7;
+/// Of slow air besides.
+const LN_SLOW: usize = 8;
 
 /// Scales as they are searched.
 pub(super) type Point = [f64; SCALES];
@@ -37,6 +39,7 @@ const PRIOR: [(f64, f64); SCALES] = [
     (0.7, 1.0),
     (-2.3, 1.5),
     (1.4, 0.6),
+    (-1.4, 0.9),
 ];
 
 /// The updraft that is everywhere the same, before the values are seen: standard deviation, m/s.
@@ -321,6 +324,7 @@ pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> A
         drift_mps: wind_mps.map_or([0.0; 2], |wind| wind.map(|part| point[DRIFT] * part)),
         gust_mps: point[LN_GUST].exp(),
         gust_s: point[LN_GUST_TIME].exp(),
+        slow_mps: point[LN_SLOW].exp(),
     }
 }
 
@@ -339,7 +343,7 @@ fn outside(point: &Point) -> f64 {
 
 /// Normal deviates that fill the space evenly: Halton's sequence, mirrored, so that they have no mean.
 fn normals(index: usize) -> SVector<f64, SCALES> {
-    const BASES: [usize; SCALES] = [2, 3, 5, 7, 11, 13, 17, 19];
+    const BASES: [usize; SCALES] = [2, 3, 5, 7, 11, 13, 17, 19, 23];
     let (half, sign) = (index / 2 + 11, if index.is_multiple_of(2) { 1.0 } else { -1.0 });
     SVector::from_fn(|row, _| sign * quantile(halton(half, BASES[row])))
 }

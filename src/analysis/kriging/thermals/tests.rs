@@ -128,6 +128,7 @@ fn air(form: Form, sd_mps: f64, length_m: f64, time_s: f64) -> Air {
         drift_mps: [0.0; 2],
         gust_mps: 0.12,
         gust_s: 4.0,
+        slow_mps: 0.0,
     }
 }
 
