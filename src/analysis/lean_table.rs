@@ -24,7 +24,7 @@ pub struct LeanTable {
     pub change_us: Vec<Vec<f64>>,
     /// Wind that each lean is held against, m/s. Empty: not known.
     pub wind_mps: Vec<f64>,
-    /// What one standard error of each direction of the doubt about drag and lift adds to the changes, us.
+    /// Change by one standard error of each direction of the doubt about drag and lift, us.
     /// They do not vanish where lift and the flow along the axis cancel each other. Empty: not known.
     pub doubts_us: Vec<Vec<Vec<f64>>>,
 }
@@ -35,7 +35,7 @@ impl LeanTable {
         self.of(&self.change_us, lean_deg, climb_mps)
     }
 
-    /// What one standard error of each direction of its doubt adds to that change, us; `None` where the
+    /// Change by one standard error of each direction of the doubt, us; `None` where the
     /// table does not have it.
     pub fn doubts_at(&self, lean_deg: f64, climb_mps: f64) -> Option<[f64; DIRECTIONS]> {
         let of = |direction: usize| {

@@ -1,4 +1,4 @@
-//! What wind may do to a vehicle whose physics is known by its form: lean and pulse in its file's form,
+//! Effect of wind on a vehicle whose physics is known by its form: lean and pulse in its file's form,
 //! and what other sizes and forms of drag and lift make of them.
 //!
 //! The pulse of a hover in wind is corrected by the lean, through two laws: how the vehicle leans in wind
@@ -40,7 +40,7 @@ pub struct Response {
     pub change_us: Vec<Vec<f64>>,
 }
 
-/// What wind does to a vehicle, as its file says, and what is doubted about it.
+/// Effect of wind on a vehicle, as its file says, and what is doubted about it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WindForms {
     /// Step of the wind from 0 on, m/s.

@@ -148,7 +148,7 @@ impl WindLegs {
     }
 }
 
-/// What legs buy: standard errors of a map in a wind, m/s, that was calibrated in a light one.
+/// Worth of legs: standard errors of a map in a wind, m/s, that was calibrated in a light one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bought {
     /// With the vehicle's file alone.
@@ -157,7 +157,7 @@ pub struct Bought {
     pub with_mps: f64,
 }
 
-/// What legs over ground at these velocities (show frame, m/s), flown in a light wind, buy in a strong one.
+/// Worth of legs over ground at these velocities (show frame, m/s), flown in a light wind, in a strong one.
 pub fn bought(forms: &WindForms, ground_mps: &[[f64; 2]], wind_mps: f64) -> Bought {
     let legs = WindLegs::expected(forms, ground_mps, [EXPECTED_WIND_MPS, 0.0], EXPECTED_NOISE_US);
     let error = |belief: &Belief| forms.error_mps(belief, EXPECTED_WIND_MPS, wind_mps);

@@ -67,7 +67,7 @@ pub struct FieldRow {
     pub truth_mps: Option<f64>,
     /// Posterior mean of the vertical air speed, m/s, up positive.
     pub posterior_mps: Option<f64>,
-    /// Its standard deviation, all origins of error included, m/s.
+    /// Standard deviation of the posterior, all origins of error included, m/s.
     pub posterior_sd_mps: Option<f64>,
 }
 

@@ -28,7 +28,7 @@ pub struct GridRow {
     pub z_m: f64,
     /// Posterior mean of the vertical air speed, m/s, up positive.
     pub w_mps: f64,
-    /// Its standard deviation, all origins of error included, m/s.
+    /// Standard deviation of that air, all origins of error included, m/s.
     pub sd_mps: f64,
 }
 

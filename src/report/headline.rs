@@ -1,4 +1,4 @@
-//! What a calibration says first, in words: the law that its windows prefer, and its updraft against another
+//! Words of a calibration's first line: the law that its windows prefer, and its updraft against another
 //! calibration.
 
 use crate::analysis::LawKind;

@@ -1,4 +1,4 @@
-//! What a posterior map says, in words: the same ones on the page and in a terminal.
+//! Words of a posterior map: the same ones on the page and in a terminal.
 
 use crate::analysis::result::{AirScales, PosteriorMap, PosteriorScale, UpdraftMap};
 use crate::base::estimate::Estimate;

@@ -96,7 +96,7 @@ const TOLD_WINDS_MPS: [f64; 2] = [5.0, 8.0];
 /// Standard errors in half of a 95 % interval.
 const NORMAL: f64 = 1.96;
 
-/// What the horizontal legs of a calibration buy in wind, in a sentence; `None` without legs, and for vehicles
+/// Sentence on what the horizontal legs of a calibration buy in wind; `None` without legs, and for vehicles
 /// whose lean tells no wind.
 pub fn legs_buy(plan: &Plan, vehicle: &Vehicle) -> Option<String> {
     let legs = plan

@@ -1,4 +1,4 @@
-//! What wind may do to a vehicle by its file: the trim of its physics, and of other sizes and forms of it.
+//! Effect of wind on a vehicle by its file: the trim of its physics, and of other sizes and forms of it.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! What may be a drone's response to the vertical air speed: a line with bends, and a smooth rest.
+//! Curves that a drone's response to the vertical air speed may be: a line with bends, and a smooth rest.
 //!
 //! The curve is a Gaussian process: two windows have the covariance
 //! `sum_b sd_b² b(v) b(v') + s² k(|v - v'| / l)` of all that it may be, with the functions `b` of

@@ -1,4 +1,4 @@
-//! What is different with drones that move: no constellation of neighbours comes again, and the wind is not read from
+//! Posterior map of drones that move: no constellation of neighbours comes again, and the wind is not read from
 //! leans.
 
 use rayon::prelude::*;

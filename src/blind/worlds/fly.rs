@@ -64,7 +64,7 @@ pub fn fly(
 /// How a plan is flown.
 #[derive(Clone, Copy)]
 pub struct Settings<'a> {
-    /// The world.
+    /// World that is flown in: plant, air, battery, noise and what is hidden.
     pub world: &'a World,
     /// Seed of the air's motion: flights of one fleet meet different air.
     pub air_seed: u64,
