@@ -3,7 +3,7 @@
 //! It falls with the length of the averages while they average noise and short gusts away, and rises
 //! again when slow motion of the air and drift of the pulse take over. Its minimum says how well neighbouring
 //! averages repeat, not how near they are to the mean of the air: in slow air it is at the shortest average.
-//! How long a baseline must be is said by [`super::baseline`].
+//! How long a baseline must be is said by `super::baseline`.
 
 use std::fmt::Write as _;
 
