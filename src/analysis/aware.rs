@@ -245,7 +245,7 @@ impl<'a> Aware<'a> {
         let airs = referred.iter().flatten().filter_map(|(one, _)| values.air_mps(one.pulse_us));
         // Errors of the law at one speed: a slope that followed the values would shrink them until they looked calm.
         let middle_mps = mean(airs).unwrap_or_default();
-        measured.slope_share = values.slope_share(middle_mps);
+        [measured.slope_share, measured.own_slope_share] = values.slope_shares(middle_mps);
         // What wind does beyond its correction is told by no flutter of the lean, which a drone's inertia delays: its
         // doubt is one constant.
         let steady = |doubt: usize| {
@@ -577,8 +577,8 @@ impl Values<'_> {
         }
     }
 
-    /// Standard error of the law's slope as a share of it.
-    fn slope_share(&self, air_mps: f64) -> f64 {
+    /// Standard errors of the slope by the fleet's law and by the drone's own part of it, as shares of it.
+    fn slope_shares(&self, air_mps: f64) -> [f64; 2] {
         let by: [f64; PARAMETERS] = match self.shape {
             Shape::Line => [0.0, 1.0, 2.0 * air_mps, 2.0 * air_mps.abs()],
             Shape::SignedQuadratic => [0.0, 2.0 * air_mps.abs(), 0.0, 0.0],
@@ -590,8 +590,10 @@ impl Values<'_> {
             }
         }
         let slope = self.slope(air_mps);
-        let share = (self.common_us2(&by) + own.max(0.0)).sqrt() / slope;
-        if slope > 0.0 && share.is_finite() { share.min(MOST_SLOPE_SHARE) } else { 0.0 }
+        [self.common_us2(&by), own.max(0.0)].map(|us2| {
+            let share = us2.sqrt() / slope;
+            if slope > 0.0 && share.is_finite() { share.min(MOST_SLOPE_SHARE) } else { 0.0 }
+        })
     }
 
     /// Pulse per vertical air speed where a value was made, us/(m/s): never as flat as a signed quadratic

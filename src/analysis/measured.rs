@@ -14,8 +14,9 @@ pub(super) struct Measured {
     pub(super) interval_mps: Vec<Option<[f64; 2]>>,
     /// The values with what they hang on.
     pub(super) modelled: Vec<Option<Value>>,
-    /// Standard error of the law's slope as a share of it.
+    /// Standard error of the fleet's slope as a share of it, and of what is the drone's own of its slope.
     pub(super) slope_share: f64,
+    pub(super) own_slope_share: f64,
     pub(super) mean_mps: f64,
     pub(super) mean_interval_mps: [f64; 2],
     pub(super) errors: ErrorBudget,

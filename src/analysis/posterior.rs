@@ -39,7 +39,12 @@ pub(super) fn seen(
             })
             .collect()
     };
-    Some(Drone { place_m, values, slope_share: measured.slope_share })
+    Some(Drone {
+        place_m,
+        values,
+        slope_share: measured.slope_share,
+        own_slope_share: measured.own_slope_share,
+    })
 }
 
 /// Adds the posterior to a map whose drones have places and errors.
@@ -156,6 +161,7 @@ fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
             gust_mps: 0.0,
             gust_s: 1.0,
             slow_mps: 0.0,
+            shared_mps: 0.0,
         });
     }
     for gust in gusts {
@@ -176,6 +182,7 @@ const STILL: Air = Air {
     gust_mps: 0.0,
     gust_s: 1.0,
     slow_mps: 0.0,
+    shared_mps: 0.0,
 };
 
 /// Gives all values the fleet's mean of what an error of its law adds to them.

@@ -62,6 +62,7 @@ mod tests {
             gust_mps: 0.0,
             gust_s: 4.0,
             slow_mps: 0.0,
+            shared_mps: 0.0,
         })
     }
 

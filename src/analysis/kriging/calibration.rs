@@ -6,25 +6,26 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{Air, Covariance, Form};
+use super::covariance::{Air, Covariance};
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
-use crate::numeric::extent;
 
 /// How much stronger the air of the calibration may have been than that of the hover, with weights: hours
 /// apart the air differs by such factors. Chosen.
-const STRENGTHS: [(f64, f64); 5] = [(0.45, 0.1), (0.7, 0.2), (1.0, 0.4), (1.4, 0.2), (2.0, 0.1)];
+const STRENGTHS: [(f64, f64); 3] = [(0.6, 0.25), (1.0, 0.5), (1.7, 0.25)];
 /// How much longer the air is in height than on the level, with weights: turbulence is alike in all
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
 /// White scatter of the windows' averages besides their noise, us. A grid.
 const WHITES_US: [f64; 3] = [0.3, 1.0, 3.0];
 /// Drones that stand for all.
-const STAND_INS: usize = 8;
-/// Nodes of the mean over a window, as shares of its length from its middle on, with their weights (Gauss and Legendre).
-const NODES: [(f64, f64); 3] =
-    [(-0.387_298_335, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_335, 5.0 / 18.0)];
+const STAND_INS: usize = 6;
+/// Nodes of the mean over a window, as shares of its length from its middle on (Gauss and Legendre).
+const NODES: [f64; 2] = [-0.288_675_135, 0.288_675_135];
+
+/// Weight of each pair of them.
+const WEIGHT: f64 = 0.25;
 
 /// The law of the fleet in air of one kind.
 #[derive(Clone, Debug)]
@@ -35,13 +36,6 @@ pub(super) struct Component {
     pub(super) covariance: DMatrix<f64>,
     /// Logarithm of the likelihood of the windows with the choice's own weight.
     pub(super) log_weight: f64,
-}
-
-/// The covariance that windows are judged by. Of a smooth field the differences between windows that follow each other
-/// would be known to a fraction of a microsecond, and whatever a law does not describe would be extrapolated to metres
-/// per second; an exponential one with the same scales leaves them their doubt.
-fn rough(air: &Air) -> Covariance {
-    Covariance::new(Air { form: Form::Exponential, ..*air })
 }
 
 impl CellAt {
@@ -100,12 +94,12 @@ impl<'a> Calibration<'a> {
         let gusts = covariance.gusts(one.time_s - other.time_s);
         let over = |x_m: f64, y_m: f64| {
             let mut sum = 0.0;
-            for (at, weight) in NODES {
-                for (other_at, other_weight) in NODES {
+            for at in NODES {
+                for other_at in NODES {
                     let (time_s, height_m) = one.at(at);
                     let (other_s, other_m) = other.at(other_at);
                     let apart_m = [x_m, y_m, (height_m - other_m) / taller];
-                    sum += weight * other_weight * covariance.instant(apart_m, time_s - other_s);
+                    sum += WEIGHT * covariance.instant(apart_m, time_s - other_s);
                 }
             }
             sum
@@ -114,14 +108,18 @@ impl<'a> Calibration<'a> {
         if self.pairs_m.is_empty() {
             return (own + gusts, 0.0);
         }
-        let each = self.pairs_m.iter().map(|[x_m, y_m]| over(*x_m, *y_m) + over(-x_m, -y_m));
+        let both = |[x_m, y_m]: &[f64; 2]| {
+            let there = over(*x_m, *y_m);
+            there + if covariance.is_reversible() { there } else { over(-x_m, -y_m) }
+        };
+        let each = self.pairs_m.iter().map(both);
         let shared = (own * self.stand_ins + each.sum::<f64>()) / self.stand_ins.powi(2);
         (shared + gusts / self.drones, own + gusts - shared)
     }
 
     /// The fleet's law under all that is left open in air of these scales.
     pub(super) fn components(&self, air: &Air) -> Vec<Component> {
-        let covariance = rough(air);
+        let covariance = Covariance::new(*air);
         let cells = &self.windows.cells;
         let mut found = Vec::new();
         for (taller, tall_weight) in TALLER {
@@ -144,15 +142,9 @@ impl<'a> Calibration<'a> {
         found
     }
 
-    /// From the first window to the last, s.
-    pub(super) fn span_s(&self) -> f64 {
-        extent(self.windows.cells.iter().map(|cell| cell.time_s))
-            .map_or(0.0, |(first, last)| last - first)
-    }
-
     /// The fleet's law in air of known scales, alike in all directions and as strong as they say.
     pub(super) fn known(&self, air: &[Air]) -> Option<Component> {
-        let air: Vec<Covariance> = air.iter().map(rough).collect();
+        let air: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
         let cells = &self.windows.cells;
         let shared = |row: usize, column: usize| {
             air.iter().map(|part| self.air(part, &cells[row], &cells[column], 1.0).0).sum()
@@ -180,7 +172,7 @@ impl<'a> Calibration<'a> {
 
     /// Standard error of one drone's constant against the fleet's by air that it met alone, us.
     pub(super) fn own_us(&self, air: &Air) -> f64 {
-        let covariance = rough(air);
+        let covariance = Covariance::new(*air);
         let Windows { record, cells, .. } = self.windows;
         let alone =
             |row: usize, column: usize| self.air(&covariance, &cells[row], &cells[column], 1.0).1;

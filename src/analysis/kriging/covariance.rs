@@ -38,6 +38,9 @@ const SLOW_M: f64 = 145.0;
 /// Its time, s.
 const SLOW_S: f64 = 186.0;
 
+/// Time of errors that all drones share, s: wind comes and goes within half a minute at the heights of shows.
+const SHARED_S: f64 = 30.0;
+
 /// Scales of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct Air {
@@ -57,25 +60,11 @@ pub(in super::super) struct Air {
     pub(in super::super) gust_mps: f64,
     /// Their time scale, s.
     pub(in super::super) gust_s: f64,
+    /// Standard deviation of an error that all drones share, m/s: what the correction for wind leaves as the wind comes and
+    /// goes. No air; it lasts for [`SHARED_S`].
+    pub(in super::super) shared_mps: f64,
     /// Standard deviation of slow air besides, m/s: an exponential field of [`SLOW_M`] and [`SLOW_S`].
     pub(in super::super) slow_mps: f64,
-}
-
-impl Air {
-    /// How long the field stays the same at one place, s: its integral time, by its own changes and by what drifts past.
-    pub(super) fn stays_s(&self) -> f64 {
-        let [u, v] = self.drift_mps;
-        let drift_mps = u.hypot(v);
-        let stays = |time_s: f64, length_m: f64| 1.0 / (1.0 / time_s).hypot(drift_mps / length_m);
-        let integral = match self.form {
-            Form::Exponential => 1.0,
-            Form::Gaussian => 0.5 * std::f64::consts::PI.sqrt(),
-        };
-        let [fast, slow] = [self.sd_mps, self.slow_mps].map(|sd| sd * sd);
-        let sum =
-            fast * integral * stays(self.time_s, self.length_m) + slow * stays(SLOW_S, SLOW_M);
-        if fast + slow > 0.0 { sum / (fast + slow) } else { 0.0 }
-    }
 }
 
 /// A place (show frame, z up, m) at a time (s), and whose it is.
@@ -95,6 +84,8 @@ pub(super) struct Covariance {
     air: Air,
     /// Inverse of the matrix of lengths.
     inverse: [[f64; 2]; 2],
+    /// Variance of the drones' own slopes, as a share of them: what one shows of a field is stretched by as much.
+    slopes: f64,
 }
 
 impl Covariance {
@@ -105,11 +96,32 @@ impl Covariance {
         let (cosh, sinh) = if size > 1e-9 { (size.cosh(), size.sinh() / size) } else { (1.0, 1.0) };
         let inverse = [[cosh - sinh * q, -sinh * r], [-sinh * r, cosh + sinh * q]]
             .map(|row| row.map(|value| value / air.length_m));
-        Self { air, inverse }
+        Self { air, inverse, slopes: 0.0 }
     }
 
-    /// Covariance of two means over 10 s, (m/s)².
+    /// As drones show it whose laws have slopes of their own, with this standard error as a share.
+    pub(super) fn shown(self, slope_share: f64) -> Self {
+        Self { slopes: slope_share * slope_share, ..self }
+    }
+
+    /// Whether the past is as the future: where nothing drifts by.
+    pub(super) fn is_reversible(&self) -> bool {
+        self.air.drift_mps == [0.0; 2]
+    }
+
+    /// Covariance of two means over 10 s as drones show them, (m/s)².
     pub(super) fn of(&self, one: &Spot, other: &Spot) -> f64 {
+        let is_own = one.drone.is_some() && one.drone == other.drone;
+        self.covariance(one, other, if is_own { 1.0 + self.slopes } else { 1.0 })
+            + self.shared(one.time_s - other.time_s)
+    }
+
+    /// Covariance of a mean of the air itself with one that a drone shows, (m/s)².
+    pub(super) fn with_air(&self, air: &Spot, shown: &Spot) -> f64 {
+        self.covariance(air, shown, 1.0)
+    }
+
+    fn covariance(&self, one: &Spot, other: &Spot, stretch: f64) -> f64 {
         let apart_s = one.time_s - other.time_s;
         let apart_m = [0, 1, 2].map(|axis| one.place_m[axis] - other.place_m[axis]);
         let velocities = [one.velocity_mps, other.velocity_mps];
@@ -119,10 +131,16 @@ impl Covariance {
             along(self, apart_m, apart_s, velocities)
         };
         if one.drone.is_some() && one.drone == other.drone {
-            field + self.gusts(apart_s)
+            stretch * field + self.gusts(apart_s)
         } else {
             field
         }
+    }
+
+    /// Covariance of the error that all drones share, (m/s)².
+    fn shared(&self, apart_s: f64) -> f64 {
+        let variance = self.air.shared_mps.powi(2);
+        if variance == 0.0 { 0.0 } else { variance * mean_exponential(apart_s, SHARED_S) }
     }
 
     /// Covariance of the field alone, (m/s)².
@@ -218,6 +236,7 @@ mod tests {
             gust_mps: 0.2,
             gust_s: 4.0,
             slow_mps: 0.0,
+            shared_mps: 0.0,
         }
     }
 

@@ -32,8 +32,10 @@ pub(in super::super) struct Drone {
     pub(in super::super) place_m: Vec<[f64; 3]>,
     /// Values at the seconds common to all drones.
     pub(in super::super) values: Vec<Option<Value>>,
-    /// Standard error of the slope of its law as a share of it.
+    /// Standard error of the fleet's slope as a share of it.
     pub(in super::super) slope_share: f64,
+    /// Standard error of its own slope against the fleet's, likewise.
+    pub(in super::super) own_slope_share: f64,
 }
 
 /// One value as a row of the model.

@@ -5,27 +5,30 @@ use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
 use super::data::{Drone, Rows, UNIFORM};
 use super::grid::{Grid, grid};
+use super::levinson::{Blocks, Size};
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
-use super::scales::{
-    Found, LN_LENGTH, LN_TIME, Sample, Search, UNIFORM_MPS, log_prior, open_factor,
-};
+use super::sampling::samples;
+use super::scales::{Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, log_prior, open_factor};
 use super::thermals::{Record, Thermal};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::running::RUNNING_S;
 use crate::analysis::shape::PARAMETERS;
+use crate::numeric::rms;
 
 /// What the likelihood conditions on.
 const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
+/// What the scales and the zero of a hover are found by. Numerical: 16 drones, and the 300 s before a value.
+const FINE: Size = Size { drones: 16, operations: 12e6 };
+/// What the search begins with.
+const COARSE: Size = Size { drones: 9, operations: 2e6 };
 /// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
 const FEWEST: usize = 24;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
 /// Over level ground there is none in the long run. Chosen.
 const UNIFORM_SHARE: f64 = 0.2;
-/// Fewer independent pieces of the air are not counted: the expansion of [`widened`] ends there. Numerical.
-const FEWEST_PIECES: f64 = 1.5;
 /// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
@@ -94,10 +97,16 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let neighbours = if moves { moving::thinned(&all) } else { all.clone() };
     let roughly: Vec<f64> =
         input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();
+    let slope_share = rms(input.drones.iter().map(|drone| drone.own_slope_share)).unwrap_or(0.0);
+    let blocks = Blocks::of(input.drones, &rows, FINE);
+    let coarse = blocks.is_some().then(|| Blocks::of(input.drones, &rows, COARSE)).flatten();
     let search = Search {
         rows: &rows,
         neighbours: &neighbours,
+        blocks: blocks.as_ref(),
+        coarse: coarse.as_ref(),
         own_mps: &roughly,
+        slope_share,
         wind_mps: input.wind_mps,
         factor: open_factor(&prior_factor(None, false)),
     };
@@ -109,36 +118,39 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
             found = search.best()?;
         }
     }
-    let record =
-        Record { search: &search, drones: input.drones, found: &found, wind_mps: input.wind_mps };
+    let record = Record {
+        search: &Search { blocks: None, coarse: None, ..search },
+        drones: input.drones,
+        found: &found,
+        wind_mps: input.wind_mps,
+    };
     let thermals = record.thermals();
     let air = search.air(found.form, &found.best);
     // Air that each drone met alone in its calibration is in its constant.
     let own = input.calibration.own_us(&air) / input.slope.max(1.0);
     let own_mps: Vec<f64> = input.drones.iter().map(|drone| drone.own_mps().max(own)).collect();
     let search = Search { own_mps: &own_mps, ..search };
-    let samples = Search::samples(&found, |point| {
+    let samples = samples(&found, |point| {
         let system = search.system(found.form, point)?;
         let components = input.calibration.components(&search.air(found.form, point));
         let choices = choices(&system, &components);
         let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
         Some((log_likelihood + log_prior(point), choices))
     });
-    let search = Search { neighbours: &all, ..search };
+    let (length_m, time_s) = (scale(&search, &found, LN_LENGTH), scale(&search, &found, LN_TIME));
+    let search = Search { neighbours: &all, blocks: None, ..search };
     let system = search.system(found.form, &found.best)?;
     let (mean, covariance, uniform_probability) = if moves {
         // With all values: the samples had only some.
         let components = input.calibration.components(&air);
-        let sample = Sample { weight: 1.0 };
-        mixed(&[(sample, choices(&system, &components))])?
+        mixed([(1.0, choices(&system, &components).as_slice())].into_iter())?
     } else {
-        mixed(&samples)?
+        mixed(samples.iter().map(|drawn| (drawn.weight, drawn.kept.as_slice())))?
     };
-    let seen_s = input.seconds as f64 + input.calibration.span_s();
-    let covariance = widened(&covariance, &air, seen_s);
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
-    let model = Model { drones: input.drones, covariance: Covariance::new(air), linear };
+    let model =
+        Model { drones: input.drones, covariance: Covariance::new(air).shown(slope_share), linear };
     let adequacy = adequate(&model, &rows, &all);
     let mut sites: Vec<(Option<usize>, [f64; 3])> = (0..input.drones.len())
         .map(|index| (Some(index), input.drones[index].place_at(0).unwrap_or_default()))
@@ -157,8 +169,8 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         drones,
         lost,
         air,
-        length_m: scale(&search, &found, LN_LENGTH),
-        time_s: scale(&search, &found, LN_TIME),
+        length_m,
+        time_s,
         adequacy,
         zero_shift_mps,
         uniform_probability,
@@ -212,14 +224,13 @@ fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// Mean and covariance of the common errors over all choices, and the weight of a uniform updraft.
-fn mixed(samples: &[(Sample, Vec<Choice>)]) -> Option<(CommonVector, Common, f64)> {
+fn mixed<'a>(
+    samples: impl Iterator<Item = (f64, &'a [Choice])>,
+) -> Option<(CommonVector, Common, f64)> {
     let weighed: Vec<(f64, &Choice)> = samples
-        .iter()
-        .flat_map(|(sample, choices)| {
+        .flat_map(|(weight, choices)| {
             let sum = log_sum(choices.iter().map(|choice| choice.log_weight));
-            choices
-                .iter()
-                .map(move |choice| (sample.weight * (choice.log_weight - sum).exp(), choice))
+            choices.iter().map(move |choice| (weight * (choice.log_weight - sum).exp(), choice))
         })
         .collect();
     if weighed.is_empty() {
@@ -237,18 +248,6 @@ fn mixed(samples: &[(Sample, Vec<Choice>)]) -> Option<(CommonVector, Common, f64
     let uniform =
         weighed.iter().filter(|(_, choice)| choice.is_uniform).map(|(weight, _)| weight).sum();
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
-}
-
-/// The covariance of the common errors with a wider zero where the record shows few independent pieces of the air: of two
-/// or three nobody learns how strong it is, and errors have the tails of Student's t with as many degrees of freedom
-/// (its 97.5 % quantile by the expansion of Abramowitz and Stegun 26.7.5).
-fn widened(covariance: &Common, air: &Air, seen_s: f64) -> Common {
-    let freedom = (seen_s / (2.0 * air.stays_s())).max(FEWEST_PIECES);
-    let wider = 1.0 + 1.21 / freedom + 1.44 / (freedom * freedom);
-    let by = CommonVector::from_fn(
-        |row, _| if row < PARAMETERS || row == UNIFORM { wider } else { 1.0 },
-    );
-    covariance.component_mul(&(by * by.transpose()))
 }
 
 /// A scale that is searched as a logarithm.

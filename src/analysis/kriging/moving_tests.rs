@@ -105,7 +105,12 @@ fn flown(case: &Case, seed: u64) -> (Vec<Drone>, Vec<Vec<f64>>) {
             })
         });
         let place_m = (0..seconds).map(|second| place_m(case, index, second as f64)).collect();
-        drones.push(Drone { place_m, values: values.collect(), slope_share: 0.0 });
+        drones.push(Drone {
+            place_m,
+            values: values.collect(),
+            slope_share: 0.0,
+            own_slope_share: 0.0,
+        });
         truths.push(truth);
     }
     (drones, truths)
@@ -120,8 +125,16 @@ fn mapped(drones: &[Drone]) -> Vec<Series> {
     let own_mps = vec![OWN_MPS; drones.len()];
     let mut factor = Common::zeros();
     factor[(UNIFORM, UNIFORM)] = 3.0;
-    let mut search =
-        Search { rows: &rows, neighbours: &some, own_mps: &own_mps, wind_mps: None, factor };
+    let mut search = Search {
+        rows: &rows,
+        neighbours: &some,
+        blocks: None,
+        coarse: None,
+        own_mps: &own_mps,
+        slope_share: 0.0,
+        wind_mps: None,
+        factor,
+    };
     let mut found = search.best().unwrap();
     search.wind_mps = moving::drift(&search, &found);
     if search.wind_mps.is_some() {

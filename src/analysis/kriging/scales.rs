@@ -6,12 +6,13 @@ use rayon::prelude::*;
 
 use super::covariance::{Air, Covariance, Form};
 use super::data::{Rows, UNIFORM};
+use super::levinson::Blocks;
 use super::neighbours::Neighbours;
 use super::vecchia::{Common, CommonVector, System};
 use crate::numeric::{differences, minimise};
 
 /// Scales that are searched, mostly as logarithms.
-pub(super) const SCALES: usize = 9;
+pub(super) const SCALES: usize = 10;
 pub(super) const LN_SD: usize = 0;
 pub(super) const LN_LENGTH: usize = 1;
 const STRETCH_ALONG: usize = 2;
@@ -23,6 +24,8 @@ pub(super) const LN_GUST: usize = 6;
 const LN_GUST_TIME: usize = 7;
 /// Of slow air besides.
 const LN_SLOW: usize = 8;
+/// Of the error that all drones share, as a share of the wind.
+const LN_SHARED: usize = 9;
 
 /// Scales as they are searched.
 pub(super) type Point = [f64; SCALES];
@@ -30,16 +33,17 @@ pub(super) type Point = [f64; SCALES];
 /// What is known before the values are seen: mean and standard deviation of each scale. A field day has 0.5 m/s,
 /// 145 m and 186 s (docs/physics.md, 4.1); the priors reach from a tenth to ten times that and more, and only
 /// matter where the values say nothing. A field drifts with the wind, or does not.
-const PRIOR: [(f64, f64); SCALES] = [
+pub(super) const PRIOR: [(f64, f64); SCALES] = [
     (-1.2, 1.5),
-    (4.4, 1.0),
+    (4.7, 1.0),
     (0.0, 0.35),
     (0.0, 0.35),
-    (4.6, 1.0),
-    (0.7, 1.0),
+    (5.2, 1.1),
+    (0.9, 0.4),
     (-2.3, 1.5),
     (1.4, 0.6),
     (-1.4, 0.9),
+    (-3.9, 0.7),
 ];
 
 /// The updraft that is everywhere the same, before the values are seen: standard deviation, m/s.
@@ -48,10 +52,8 @@ pub(super) const UNIFORM_MPS: f64 = 3.0;
 const FARTHEST: f64 = 4.0;
 /// Step of the second differences. Numerical.
 const STEP: f64 = 0.05;
-/// Choices of the scales that stand for all that the values allow.
-const SAMPLES: usize = 64;
-/// Samples are drawn so much wider than the curvature at the maximum says: the tails are.
-const WIDER: f64 = 1.25;
+/// Step of the first differences. Numerical.
+const SLOPE_STEP: f64 = 1e-4;
 
 /// See [`Axis::reach`]. Numerical.
 const LEAST_REACH: f64 = 0.5;
@@ -68,7 +70,13 @@ const LINE_STEPS: i32 = 12;
 pub(super) struct Search<'a> {
     pub(super) rows: &'a Rows,
     pub(super) neighbours: &'a Neighbours,
+    /// All values at once, where that can be had.
+    pub(super) blocks: Option<&'a Blocks>,
+    /// Some of them, to begin a search with.
+    pub(super) coarse: Option<&'a Blocks>,
     pub(super) own_mps: &'a [f64],
+    /// Standard error of the drones' own slopes as a share of them.
+    pub(super) slope_share: f64,
     /// Mean horizontal wind along show x and y, m/s; where it is not known, the field is taken to stay.
     pub(super) wind_mps: Option<[f64; 2]>,
     /// Factor of the prior covariance of the common errors.
@@ -85,22 +93,33 @@ pub(super) struct Found {
     /// Covariance of the scales.
     pub(super) covariance: SMatrix<f64, SCALES, SCALES>,
     /// How far the posterior reaches to both sides of its top.
-    axes: Vec<Axis>,
+    pub(super) axes: Vec<Axis>,
 }
 
 /// One direction of the posterior of the scales, as far as one standard deviation by the curvature at the top.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
-    along: SVector<f64, SCALES>,
+pub(super) struct Axis {
+    pub(super) along: SVector<f64, SCALES>,
     /// How much farther it reaches than the curvature says, ahead and behind: a slow strong air cannot be told from a
     /// fast weak one by a short record, and the curvature at the top does not see that.
-    reach: [f64; 2],
+    pub(super) reach: [f64; 2],
 }
 
-/// Weight of a choice of the scales.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
-    pub(super) weight: f64,
+#[cfg(test)]
+impl Found {
+    /// A normal distribution around a point.
+    pub(super) fn guess(
+        form: Form,
+        best: Point,
+        covariance: &SMatrix<f64, SCALES, SCALES>,
+    ) -> Self {
+        let axes = (0..SCALES).map(|axis| {
+            let mut along = SVector::zeros();
+            along[axis] = covariance[(axis, axis)].sqrt();
+            Axis { along, reach: [1.0; 2] }
+        });
+        Self { form, best, log_posterior: 0.0, covariance: *covariance, axes: axes.collect() }
+    }
 }
 
 /// A prior in which the law's constant is not known, nor the updraft that is everywhere the same.
@@ -128,13 +147,30 @@ impl Search<'_> {
         if outside(point) > 0.0 {
             return None;
         }
-        let covariance = Covariance::new(self.air(form, point));
-        System::new(self.rows, self.neighbours, &covariance, self.own_mps)
+        let covariance = Covariance::new(self.air(form, point)).shown(self.slope_share);
+        match self.blocks {
+            Some(blocks) => blocks.system(&covariance, self.own_mps),
+            None => System::new(self.rows, self.neighbours, &covariance, self.own_mps),
+        }
     }
 
-    /// The most probable scales from a start.
+    /// Slopes of the loss, each by a thread of its own.
+    fn slopes(&self, form: Form, at: &Point, value: f64) -> Point {
+        let slopes: Vec<f64> = (0..SCALES)
+            .into_par_iter()
+            .map(|index| {
+                let mut beside = *at;
+                beside[index] += SLOPE_STEP;
+                (-self.log_posterior(form, &beside) - value) / SLOPE_STEP
+            })
+            .collect();
+        std::array::from_fn(|index| if slopes[index].is_finite() { slopes[index] } else { 0.0 })
+    }
+
+    /// The most probable scales from a start, by some of the values where that is enough to begin with.
     fn climb(&self, form: Form, start: Point) -> (Point, f64) {
-        let loss = |point: &Point| -self.log_posterior(form, point);
+        let some = Search { blocks: self.coarse.or(self.blocks), ..*self };
+        let loss = |point: &Point| -some.log_posterior(form, point);
         minimise(start, loss, |at, value| differences(loss, at, value))
     }
 
@@ -157,10 +193,20 @@ impl Search<'_> {
                 (*form, point, -loss)
             })
             .collect();
-        let (form, best, log_posterior) = climbed
-            .into_iter()
-            .filter(|(_, _, value)| value.is_finite())
-            .max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let best_of = |climbed: Vec<(Form, Point, f64)>| {
+            let known = climbed.into_iter().filter(|(_, _, value)| value.is_finite());
+            known.max_by(|a, b| a.2.total_cmp(&b.2))
+        };
+        let (form, mut best, mut log_posterior) = best_of(climbed)?;
+        if self.coarse.is_some() {
+            let loss = |point: &Point| -self.log_posterior(form, point);
+            let slopes = |at: &Point, value| self.slopes(form, at, value);
+            let (point, least) = minimise(best, loss, slopes);
+            (best, log_posterior) = (point, -least);
+        }
+        if !log_posterior.is_finite() {
+            return None;
+        }
         let covariance = self.curvature(form, &best, log_posterior);
         let axes = self.axes(form, &best, log_posterior, &covariance);
         Some(Found { form, best, log_posterior, covariance, axes })
@@ -273,44 +319,6 @@ impl Search<'_> {
         };
         [at(0.025), at(0.975)]
     }
-
-    /// Points that stand for all that the values allow, with weights that add up to one: drawn from the
-    /// curvature at the top, and weighed by `log_weight` of the point, which is its log-posterior.
-    pub(super) fn samples<T: Send>(
-        found: &Found,
-        weigh: impl Fn(&Point) -> Option<(f64, T)> + Sync,
-    ) -> Vec<(Sample, T)> {
-        let mut drawn: Vec<(Sample, T)> = (0..SAMPLES)
-            .into_par_iter()
-            .filter_map(|index| {
-                let normal = normals(index);
-                let mut point = found.best;
-                // The density that it is drawn from, but for a constant.
-                let mut density = -0.5 * normal.norm_squared();
-                for (axis, normal) in found.axes.iter().zip(normal.iter()) {
-                    let reach = axis.reach[usize::from(*normal < 0.0)];
-                    density -= reach.ln();
-                    let by = normal * reach * WIDER;
-                    point
-                        .iter_mut()
-                        .zip(axis.along.iter())
-                        .for_each(|(own, along)| *own += by * along);
-                }
-                let (log_posterior, kept) = weigh(&point)?;
-                let weight = log_posterior - density;
-                weight.is_finite().then_some((Sample { weight }, kept))
-            })
-            .collect();
-        let most = drawn.iter().map(|(sample, _)| sample.weight).fold(f64::NEG_INFINITY, f64::max);
-        for (sample, _) in &mut drawn {
-            sample.weight = (sample.weight - most).exp();
-        }
-        let sum: f64 = drawn.iter().map(|(sample, _)| sample.weight).sum();
-        for (sample, _) in &mut drawn {
-            sample.weight /= sum;
-        }
-        drawn
-    }
 }
 
 /// The air of a point.
@@ -325,6 +333,7 @@ pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> A
         gust_mps: point[LN_GUST].exp(),
         gust_s: point[LN_GUST_TIME].exp(),
         slow_mps: point[LN_SLOW].exp(),
+        shared_mps: wind_mps.map_or(0.0, |[u, v]| point[LN_SHARED].exp() * u.hypot(v)),
     }
 }
 
@@ -339,26 +348,4 @@ fn outside(point: &Point) -> f64 {
     let each =
         point.iter().zip(PRIOR).map(|(value, (mean, sd))| ((value - mean) / sd).abs() - FARTHEST);
     each.fold(0.0, f64::max)
-}
-
-/// Normal deviates that fill the space evenly: Halton's sequence, mirrored, so that they have no mean.
-fn normals(index: usize) -> SVector<f64, SCALES> {
-    const BASES: [usize; SCALES] = [2, 3, 5, 7, 11, 13, 17, 19, 23];
-    let (half, sign) = (index / 2 + 11, if index.is_multiple_of(2) { 1.0 } else { -1.0 });
-    SVector::from_fn(|row, _| sign * quantile(halton(half, BASES[row])))
-}
-
-fn halton(mut index: usize, base: usize) -> f64 {
-    let (mut value, mut share) = (0.0, 1.0);
-    while index > 0 {
-        share /= base as f64;
-        value += share * (index % base) as f64;
-        index /= base;
-    }
-    value
-}
-
-/// Quantile of the standard normal distribution.
-fn quantile(share: f64) -> f64 {
-    -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * share)
 }

@@ -23,7 +23,7 @@ pub(super) struct Weights {
     pub(super) variance: f64,
 }
 
-/// Weights of a pattern; `None` where rounding leaves no positive definite covariance.
+/// Weights of a pattern, for its target's value or (without noise) the air itself; `None` where rounding leaves no positive definite covariance.
 pub(super) fn weights(
     pattern: &Pattern,
     covariance: &Covariance,
@@ -31,8 +31,11 @@ pub(super) fn weights(
 ) -> Option<Weights> {
     let Pattern { target, neighbours, target_noise_mps, noise_mps } = pattern;
     let n = neighbours.len();
-    let own = covariance.of(target, target);
-    let own = if with_noise { own + target_noise_mps * target_noise_mps } else { own };
+    let own = if with_noise {
+        covariance.of(target, target) + target_noise_mps * target_noise_mps
+    } else {
+        covariance.with_air(target, target)
+    };
     if n == 0 {
         return Some(Weights { of: Vec::new(), variance: own });
     }
@@ -46,10 +49,46 @@ pub(super) fn weights(
         matrix[(row, row)] =
             covariance.of(&neighbours[row], &neighbours[row]) + noise_mps[row] * noise_mps[row];
     }
-    let to = DVector::from_fn(n, |row, _| covariance.of(target, &neighbours[row]));
+    let to = DVector::from_fn(n, |row, _| {
+        if with_noise {
+            covariance.of(target, &neighbours[row])
+        } else {
+            covariance.with_air(target, &neighbours[row])
+        }
+    });
     let of = matrix.cholesky()?.solve(&to);
     let variance = own - of.dot(&to);
     (variance > 0.0).then(|| Weights { of: of.as_slice().to_vec(), variance })
+}
+
+/// Sums over values that were made white: what they say about everything linear.
+#[derive(Clone, Debug)]
+pub(super) struct Parts {
+    /// Products of the common errors, and with the values.
+    pub(super) information: Common,
+    pub(super) score: CommonVector,
+    /// Products of the drones' constants, with the common errors and with the values.
+    pub(super) own: DMatrix<f64>,
+    pub(super) own_common: DMatrix<f64>,
+    pub(super) own_score: DVector<f64>,
+    /// Of the values.
+    pub(super) squares: f64,
+    /// Of the logarithms of what values were divided by.
+    pub(super) ln_sd: f64,
+}
+
+impl Parts {
+    pub(super) fn new(drones: usize) -> Self {
+        Self {
+            information: Common::zeros(),
+            score: CommonVector::zeros(),
+            own: DMatrix::zeros(drones, drones),
+            own_common: DMatrix::zeros(drones, COMMON),
+            own_score: DVector::zeros(drones),
+            squares: 0.0,
+            ln_sd: 0.0,
+        }
+    }
 }
 
 /// The likelihood with everything linear left open.
@@ -88,13 +127,7 @@ impl System {
         let weights: Option<Vec<Weights>> =
             neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
         let weights = weights?;
-        let drones = own_mps.len();
-        let mut information = Common::zeros();
-        let mut score = CommonVector::zeros();
-        let mut own = DMatrix::zeros(drones, drones);
-        let mut own_common = DMatrix::zeros(drones, COMMON);
-        let mut own_score = DVector::zeros(drones);
-        let (mut squares, mut ln_sd) = (0.0, 0.0);
+        let mut parts = Parts::new(own_mps.len());
         let mut constants: Vec<(usize, f64)> = Vec::new();
         for (index, row) in rows.list.iter().enumerate() {
             // What is skipped is no target, but others may be conditioned on it.
@@ -102,7 +135,7 @@ impl System {
                 continue;
             };
             let inverse = 1.0 / variance.sqrt();
-            ln_sd -= inverse.ln();
+            parts.ln_sd -= inverse.ln();
             let mut value = row.value_mps;
             let mut common = row.common;
             constants.clear();
@@ -122,19 +155,26 @@ impl System {
             }
             value *= inverse;
             let common = CommonVector::from(common) * inverse;
-            squares += value * value;
-            information.ger(1.0, &common, &common, 1.0);
-            score.axpy(value, &common, 1.0);
+            parts.squares += value * value;
+            parts.information.ger(1.0, &common, &common, 1.0);
+            parts.score.axpy(value, &common, 1.0);
             for (drone, factor) in &constants {
-                own_score[*drone] += factor * value;
+                parts.own_score[*drone] += factor * value;
                 for column in 0..COMMON {
-                    own_common[(*drone, column)] += factor * common[column];
+                    parts.own_common[(*drone, column)] += factor * common[column];
                 }
                 for (other, other_factor) in &constants {
-                    own[(*drone, *other)] += factor * other_factor;
+                    parts.own[(*drone, *other)] += factor * other_factor;
                 }
             }
         }
+        Self::integrated(parts, own_mps)
+    }
+
+    /// With the drones' constants of these standard errors integrated out.
+    pub(super) fn integrated(parts: Parts, own_mps: &[f64]) -> Option<Self> {
+        let Parts { information, score, mut own, own_common, own_score, squares, mut ln_sd } =
+            parts;
         for (drone, sd) in own_mps.iter().enumerate() {
             let sd = sd.max(LEAST_OWN_MPS);
             own[(drone, drone)] += 1.0 / (sd * sd);

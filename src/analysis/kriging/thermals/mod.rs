@@ -146,7 +146,8 @@ impl Looked<'_> {
     }
 
     fn whitening(&self, rows: &Rows, (form, point): &Scales) -> Option<Whitening<'_>> {
-        let covariance = Covariance::new(self.search.air(*form, point));
+        let covariance =
+            Covariance::new(self.search.air(*form, point)).shown(self.search.slope_share);
         let Search { factor, own_mps, .. } = self.search;
         Whitening::new(rows, self.neighbours, &covariance, factor, own_mps)
     }

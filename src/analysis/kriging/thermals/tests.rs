@@ -129,6 +129,7 @@ fn air(form: Form, sd_mps: f64, length_m: f64, time_s: f64) -> Air {
         gust_mps: 0.12,
         gust_s: 4.0,
         slow_mps: 0.0,
+        shared_mps: 0.0,
     }
 }
 
@@ -142,7 +143,8 @@ fn drones(fleet: Fleet) -> Vec<Drone> {
     };
     let values: Vec<Option<Value>> =
         (0..fleet.seconds()).map(|second| fleet.has_value(second).then_some(value)).collect();
-    let of = |place_m| Drone { place_m, values: values.clone(), slope_share: 0.0 };
+    let of =
+        |place_m| Drone { place_m, values: values.clone(), slope_share: 0.0, own_slope_share: 0.0 };
     fleet.places().into_iter().map(of).collect()
 }
 
@@ -185,7 +187,16 @@ fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<
     let own_mps = vec![OWN_MPS; drones.len()];
     let mut factor = Common::zeros();
     factor[(UNIFORM, UNIFORM)] = 3.0;
-    let search = Search { rows, neighbours: &some, own_mps: &own_mps, wind_mps, factor };
+    let search = Search {
+        rows,
+        neighbours: &some,
+        blocks: None,
+        coarse: None,
+        own_mps: &own_mps,
+        slope_share: 0.0,
+        wind_mps,
+        factor,
+    };
     let found = search.best().unwrap();
     Record { search: &search, drones, found: &found, wind_mps }.thermals()
 }
