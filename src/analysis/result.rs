@@ -379,7 +379,8 @@ pub struct FilledDrone {
 /// Scales of the air by the likelihood of all values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AirScales {
-    /// How the correlation falls with distance and time: `exponential` or `Gaussian`.
+    /// How the correlation falls with distance and time: `exponential`, `Gaussian`, or `two-thirds`
+    /// (`exp(-(r/length)^(2/3) - (t/time)^(2/3))`, as within turbulence).
     pub form: String,
     /// Standard deviation of the field, m/s.
     pub sd_mps: f64,

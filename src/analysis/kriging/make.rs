@@ -9,7 +9,7 @@ use super::levinson::{Blocks, Size};
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
-use super::sampling::samples;
+use super::sampling::{Sampled, samples};
 use super::scales::{Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, log_prior, open_factor};
 use super::thermals::{Record, Thermal};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
@@ -110,42 +110,52 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         wind_mps: input.wind_mps,
         factor: open_factor(&prior_factor(None, false)),
     };
-    let mut found = search.best()?;
+    let mut forms = search.all();
     let mut search = search;
     if let (true, None) = (moves, input.wind_mps) {
-        search.wind_mps = moving::drift(&search, &found);
+        search.wind_mps = moving::drift(&search, forms.first()?);
         if search.wind_mps.is_some() {
-            found = search.best()?;
+            forms = search.all();
         }
     }
+    let found = forms.first()?;
     let record = Record {
         search: &Search { blocks: None, coarse: None, ..search },
         drones: input.drones,
-        found: &found,
+        found,
         wind_mps: input.wind_mps,
     };
     let thermals = record.thermals();
+    let own_of = |air: &Air| -> Vec<f64> {
+        // Air that each drone met alone in its calibration is in its constant.
+        let own = input.calibration.own_us(air) / input.slope.max(1.0);
+        input.drones.iter().map(|drone| drone.own_mps().max(own)).collect()
+    };
+    let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> = if moves {
+        Vec::new()
+    } else {
+        forms.iter().map(|found| (found, sampled(&search, input, found, &own_of))).collect()
+    };
+    let found = sampled
+        .iter()
+        .max_by(|a, b| a.1.ln_evidence.total_cmp(&b.1.ln_evidence))
+        .map_or(found, |(found, _)| found);
     let air = search.air(found.form, &found.best);
-    // Air that each drone met alone in its calibration is in its constant.
-    let own = input.calibration.own_us(&air) / input.slope.max(1.0);
-    let own_mps: Vec<f64> = input.drones.iter().map(|drone| drone.own_mps().max(own)).collect();
+    let own_mps = own_of(&air);
     let search = Search { own_mps: &own_mps, ..search };
-    let samples = samples(&found, |point| {
-        let system = search.system(found.form, point)?;
-        let components = input.calibration.components(&search.air(found.form, point));
-        let choices = choices(&system, &components);
-        let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
-        Some((log_likelihood + log_prior(point), choices))
-    });
-    let (length_m, time_s) = (scale(&search, &found, LN_LENGTH), scale(&search, &found, LN_TIME));
+    let (length_m, time_s) = (scale(&search, found, LN_LENGTH), scale(&search, found, LN_TIME));
     let search = Search { neighbours: &all, blocks: None, ..search };
     let system = search.system(found.form, &found.best)?;
     let (mean, covariance, uniform_probability) = if moves {
-        // With all values: the samples had only some.
+        // With all values: the search had only some.
         let components = input.calibration.components(&air);
         mixed([(1.0, choices(&system, &components).as_slice())].into_iter())?
     } else {
-        mixed(samples.iter().map(|drawn| (drawn.weight, drawn.kept.as_slice())))?
+        let all = log_sum(sampled.iter().map(|(_, sampled)| sampled.ln_evidence));
+        mixed(sampled.iter().flat_map(|(_, sampled)| {
+            let share = (sampled.ln_evidence - all).exp();
+            sampled.drawn.iter().map(move |drawn| (share * drawn.weight, drawn.kept.as_slice()))
+        }))?
     };
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
@@ -175,6 +185,24 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         zero_shift_mps,
         uniform_probability,
         thermals,
+    })
+}
+
+/// What the values allow of the scales of one form, with what each choice of them says about everything linear.
+fn sampled(
+    search: &Search<'_>,
+    input: &Input<'_>,
+    found: &Found,
+    own_of: &dyn Fn(&Air) -> Vec<f64>,
+) -> Sampled<Vec<Choice>> {
+    let own_mps = own_of(&search.air(found.form, &found.best));
+    let search = Search { own_mps: &own_mps, ..*search };
+    samples(found, |point| {
+        let system = search.system(found.form, point)?;
+        let components = input.calibration.components(&search.air(found.form, point));
+        let choices = choices(&system, &components);
+        let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
+        Some((log_likelihood + log_prior(point), choices))
     })
 }
 

@@ -99,11 +99,19 @@ impl Proposal<'_> {
     }
 }
 
+/// Points that stand for the posterior of one form.
+pub(super) struct Sampled<T> {
+    pub(super) drawn: Vec<Drawn<T>>,
+    /// Logarithm of the integral of what points are weighed by, but for a constant that is the same for all forms.
+    pub(super) ln_evidence: f64,
+}
+
 /// Points with their weights; `weigh` gives the logarithm of a point's posterior with whatever is to be kept of it.
 pub(super) fn samples<T: Send>(
     found: &Found,
     weigh: impl Fn(&Point) -> Option<(f64, T)> + Sync,
-) -> Vec<Drawn<T>> {
+) -> Sampled<T> {
+    let mut ln_evidence = f64::NEG_INFINITY;
     let mut drawn: Vec<Drawn<T>> = Vec::new();
     let mut proposals = vec![Proposal::Split(found)];
     for round in 0..ROUNDS {
@@ -120,13 +128,15 @@ pub(super) fn samples<T: Send>(
             })
             .collect();
         drawn.extend(more);
-        reweigh(&mut drawn, &proposals);
+        let sum = reweigh(&mut drawn, &proposals);
+        ln_evidence = sum - ((proposals.len() * POINTS) as f64).ln();
     }
-    drawn
+    Sampled { drawn, ln_evidence }
 }
 
-/// Weighs all points by the mixture of all that they were drawn from.
-fn reweigh<T>(drawn: &mut [Drawn<T>], proposals: &[Proposal<'_>]) {
+/// Weighs all points by the mixture of all that they were drawn from; the logarithm of the sum of their weights before these
+/// were made to add up to one.
+fn reweigh<T>(drawn: &mut [Drawn<T>], proposals: &[Proposal<'_>]) -> f64 {
     for one in drawn.iter_mut() {
         let densities: Vec<f64> =
             proposals.iter().map(|proposal| proposal.ln_density(&one.point)).collect();
@@ -142,6 +152,7 @@ fn reweigh<T>(drawn: &mut [Drawn<T>], proposals: &[Proposal<'_>]) {
     for one in drawn.iter_mut() {
         one.weight /= sum;
     }
+    most + sum.ln()
 }
 
 /// What the points so far say about the posterior.
@@ -213,7 +224,7 @@ mod tests {
             let rest: f64 = point[2..].iter().map(|value| value * value / 0.18).sum();
             -0.5 * ((along - 0.5) / 1.0_f64).powi(2) - 0.5 * (across / 0.25_f64).powi(2) - rest
         };
-        let drawn = samples(&found, |point| Some((ln_posterior(point), ())));
+        let drawn = samples(&found, |point| Some((ln_posterior(point), ()))).drawn;
         let weights: Vec<f64> = drawn.iter().map(|one| one.weight).collect();
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         assert!(effective(&weights) > 25.0, "{}", effective(&weights));

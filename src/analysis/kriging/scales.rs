@@ -55,6 +55,11 @@ const STEP: f64 = 0.05;
 /// Step of the first differences. Numerical.
 const SLOPE_STEP: f64 = 1e-4;
 
+/// A form that is less probable than another by so much does not count, nats. One in 150.
+const NATS: f64 = 5.0;
+/// The same where only some of the values were asked.
+const COARSE_NATS: f64 = 12.0;
+
 /// See [`Axis::reach`]. Numerical.
 const LEAST_REACH: f64 = 0.5;
 /// See [`Axis::reach`]. Numerical.
@@ -175,9 +180,15 @@ impl Search<'_> {
     }
 
     /// The most probable scales, over forms and starts.
+    #[cfg(test)]
     pub(super) fn best(&self) -> Option<Found> {
+        self.all().into_iter().next()
+    }
+
+    /// The most probable scales of each form that is not much less probable than another, the most probable first.
+    pub(super) fn all(&self) -> Vec<Found> {
         let start = PRIOR.map(|(mean, _)| mean);
-        let starts: Vec<(Form, f64)> = [Form::Exponential, Form::Gaussian]
+        let starts: Vec<(Form, f64)> = Form::ALL
             .into_iter()
             .flat_map(|form| {
                 let drifts: &[f64] = if self.wind_mps.is_some() { &[0.0, 1.0] } else { &[0.5] };
@@ -193,23 +204,30 @@ impl Search<'_> {
                 (*form, point, -loss)
             })
             .collect();
-        let best_of = |climbed: Vec<(Form, Point, f64)>| {
-            let known = climbed.into_iter().filter(|(_, _, value)| value.is_finite());
-            known.max_by(|a, b| a.2.total_cmp(&b.2))
-        };
-        let (form, mut best, mut log_posterior) = best_of(climbed)?;
+        let mut tops: Vec<(Form, Point, f64)> = Form::ALL
+            .into_iter()
+            .filter_map(|form| {
+                let own = climbed.iter().filter(|(of, _, value)| *of == form && value.is_finite());
+                own.max_by(|a, b| a.2.total_cmp(&b.2)).copied()
+            })
+            .collect();
+        keep_probable(&mut tops, if self.coarse.is_some() { COARSE_NATS } else { NATS });
         if self.coarse.is_some() {
-            let loss = |point: &Point| -self.log_posterior(form, point);
-            let slopes = |at: &Point, value| self.slopes(form, at, value);
-            let (point, least) = minimise(best, loss, slopes);
-            (best, log_posterior) = (point, -least);
+            for (form, best, log_posterior) in &mut tops {
+                let loss = |point: &Point| -self.log_posterior(*form, point);
+                let slopes = |at: &Point, value| self.slopes(*form, at, value);
+                let (point, least) = minimise(*best, loss, slopes);
+                (*best, *log_posterior) = (point, -least);
+            }
+            keep_probable(&mut tops, NATS);
         }
-        if !log_posterior.is_finite() {
-            return None;
-        }
-        let covariance = self.curvature(form, &best, log_posterior);
-        let axes = self.axes(form, &best, log_posterior, &covariance);
-        Some(Found { form, best, log_posterior, covariance, axes })
+        tops.into_iter()
+            .map(|(form, best, log_posterior)| {
+                let covariance = self.curvature(form, &best, log_posterior);
+                let axes = self.axes(form, &best, log_posterior, &covariance);
+                Found { form, best, log_posterior, covariance, axes }
+            })
+            .collect()
     }
 
     /// Inverse of the curvature of the posterior at its top.
@@ -335,6 +353,14 @@ pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> A
         slow_mps: point[LN_SLOW].exp(),
         shared_mps: wind_mps.map_or(0.0, |[u, v]| point[LN_SHARED].exp() * u.hypot(v)),
     }
+}
+
+/// Drops forms that are much less probable than another, and puts the most probable first.
+fn keep_probable(tops: &mut Vec<(Form, Point, f64)>, nats: f64) {
+    tops.retain(|(_, _, value)| value.is_finite());
+    tops.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let most = tops.first().map_or(0.0, |(_, _, value)| *value);
+    tops.retain(|(_, _, value)| *value > most - nats);
 }
 
 /// Logarithm of the prior, but for a constant.
