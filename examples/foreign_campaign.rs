@@ -209,6 +209,7 @@ fn scales(air: &AirSettings) -> TrueAir {
         sd_mps: air.own_mps,
         length_m: 0.0,
         time_s: Some(air.own_s),
+        drift_mps: None,
     };
     TrueAir { field, gusts: if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() } }
 }

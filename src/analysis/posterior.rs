@@ -165,11 +165,25 @@ fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
         });
     }
     for gust in gusts {
-        let still = Air { gust_mps: gust.sd_mps, gust_s: gust.time_s?, ..STILL };
-        parts.push(still);
+        parts.push(match gust.time_s {
+            Some(gust_s) => Air { gust_mps: gust.sd_mps, gust_s, ..STILL },
+            None => Air {
+                sd_mps: gust.sd_mps,
+                length_m: ACROSS * gust.length_m,
+                time_s: FROZEN_S,
+                drift_mps: gust.drift_mps?,
+                ..STILL
+            },
+        });
     }
     (!parts.is_empty()).then_some(parts)
 }
+
+/// Length over which vertical gusts become different (1/e) on the level, as a share of the integral length of gusts along their
+/// way: of `(1 - r / 2L) exp(-r / L)`, the correlation across in turbulence that is alike in all directions.
+const ACROSS: f64 = 0.63;
+/// Gusts that are carried along and do not change, s.
+const FROZEN_S: f64 = 1e5;
 
 /// Air without a field.
 const STILL: Air = Air {

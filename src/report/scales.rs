@@ -269,6 +269,7 @@ mod tests {
             sd_mps: 0.2,
             length_m: 30.0,
             time_s: None,
+            drift_mps: None,
         };
         let both = TrueAir { field: Some(field), gusts: vec![gusts.clone()] };
         assert!(true_air_words(&both).contains("come out shorter"));

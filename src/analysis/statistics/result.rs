@@ -99,6 +99,10 @@ pub struct TrueGusts {
     /// Correlation time of each drone's own gusts (1/e), s; absent: what the wind makes of the length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
+    /// How fast they are carried along x and y of the show frame, so that drones meet each other's, m/s; absent: not known, or
+    /// each drone has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift_mps: Option<[f64; 2]>,
 }
 
 /// The data that the statistics are made of.

@@ -62,6 +62,9 @@ pub(super) fn found_flight(
         notes.extend(doubts);
         start
     };
+    let forward_deg = plan.site.orientation_deg;
+    let true_air =
+        record.as_ref().and_then(|record| true_scales(&record.air, record.air_mps, forward_deg));
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         sag: sag(flown.is_some(), vehicle.as_ref()),
@@ -82,7 +85,7 @@ pub(super) fn found_flight(
             .map(|record| record.air_mps[2]),
         truth,
         start,
-        true_air: record.as_ref().and_then(|record| true_scales(&record.air)),
+        true_air,
         seed: record.map(|record| record.seed),
         notes,
     })
