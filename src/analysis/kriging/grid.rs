@@ -1,7 +1,7 @@
 //! The air between the drones: a grid at the fleet's height, every 10 s.
 
 use super::data::Drone;
-use super::predict::Model;
+use super::predict::{Known, Model};
 use crate::analysis::running::RUNNING_S;
 use crate::numeric::{extent, median};
 
@@ -9,7 +9,8 @@ use crate::numeric::{extent, median};
 const CELL_SHARE: f64 = 0.5;
 /// Cells in a row at most: more is finer than a screen shows. Convention.
 const MOST_CELLS: usize = 96;
-/// What is known less well than this share of what nobody knows is left out. Convention.
+/// What is known less well than this share of what nobody knows is left out; a zero that is not known well hides no pattern.
+/// Convention.
 const KNOWN_SHARE: f64 = 0.9;
 
 /// A grid of means over 10 s with standard deviations.
@@ -56,15 +57,16 @@ pub(super) fn grid(model: &Model<'_>, lost_m: &[[f64; 3]], first: usize) -> Opti
     let unknown_mps = model.unknown_mps();
     let mut grid = Grid { x_m, y_m, height_m, ..Grid::default() };
     for (second, values) in over {
-        let known =
-            |value: &Option<(f64, f64)>| value.filter(|(_, sd)| *sd < KNOWN_SHARE * unknown_mps);
-        let rows = |of: fn((f64, f64)) -> f64| -> Vec<Vec<Option<f64>>> {
+        let known = |value: &Option<Known>| {
+            value.filter(|known| known.local_mps2 < (KNOWN_SHARE * unknown_mps).powi(2))
+        };
+        let rows = |of: fn(Known) -> f64| -> Vec<Vec<Option<f64>>> {
             values
                 .chunks(grid.x_m.len())
                 .map(|row| row.iter().map(|value| known(value).map(of)).collect())
                 .collect()
         };
-        let (mean_mps, sd_mps) = (rows(|value| value.0), rows(|value| value.1));
+        let (mean_mps, sd_mps) = (rows(|known| known.mean_mps), rows(|known| known.sd_mps));
         grid.seconds.push(second);
         grid.mean_mps.push(mean_mps);
         grid.sd_mps.push(sd_mps);

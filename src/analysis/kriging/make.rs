@@ -24,6 +24,8 @@ const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
 const FINE: Size = Size { drones: 16, operations: 12e6 };
 /// What the search begins with.
 const COARSE: Size = Size { drones: 9, operations: 2e6 };
+/// Standard deviations to each side of a normal 95 % interval.
+const NORMAL: f64 = 1.96;
 /// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
 const FEWEST: usize = 24;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
@@ -143,7 +145,10 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let air = search.air(found.form, &found.best);
     let own_mps = own_of(&air);
     let search = Search { own_mps: &own_mps, ..search };
-    let (length_m, time_s) = (scale(&search, found, LN_LENGTH), scale(&search, found, LN_TIME));
+    let of_scale = |index: usize| {
+        if sampled.is_empty() { scale(&search, found, index) } else { averaged(&sampled, index) }
+    };
+    let (length_m, time_s) = (of_scale(LN_LENGTH), of_scale(LN_TIME));
     let search = Search { neighbours: &all, blocks: None, ..search };
     let system = search.system(found.form, &found.best)?;
     let (mean, covariance, uniform_probability) = if moves {
@@ -276,6 +281,28 @@ fn mixed<'a>(
     let uniform =
         weighed.iter().filter(|(_, choice)| choice.is_uniform).map(|(weight, _)| weight).sum();
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
+}
+
+/// A scale that is searched as a logarithm, over all points and forms: its mean, and 1.96 standard deviations to each side,
+/// of which one is that of the points on this side.
+fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
+    let all = log_sum(sampled.iter().map(|(_, sampled)| sampled.ln_evidence));
+    let points: Vec<(f64, f64)> = sampled
+        .iter()
+        .flat_map(|(_, sampled)| {
+            let share = (sampled.ln_evidence - all).exp();
+            sampled.drawn.iter().map(move |drawn| (share * drawn.weight, drawn.point[index]))
+        })
+        .collect();
+    let mean: f64 = points.iter().map(|(weight, value)| weight * value).sum();
+    let side = |sign: f64| {
+        let beyond = || points.iter().filter(move |(_, value)| sign * (value - mean) > 0.0);
+        let weight: f64 = beyond().map(|(weight, _)| weight).sum();
+        let squares: f64 = beyond().map(|(weight, value)| weight * (value - mean).powi(2)).sum();
+        if weight > 0.0 { (squares / weight).sqrt() } else { 0.0 }
+    };
+    let interval = [mean - NORMAL * side(-1.0), mean + NORMAL * side(1.0)];
+    Scale { value: mean.exp(), interval: interval.map(f64::exp) }
 }
 
 /// A scale that is searched as a logarithm.

@@ -36,13 +36,21 @@ pub(in super::super) struct Series {
     pub(in super::super) over_all: Option<(f64, f64)>,
 }
 
-/// Mean and standard deviation, m/s; `None`: not known.
-pub(super) type Known = Option<(f64, f64)>;
+/// What is known at a place and time, m/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Known {
+    pub(super) mean_mps: f64,
+    pub(super) sd_mps: f64,
+    /// Variance without what all drones share, (m/s)²: how well the place is known against its surroundings.
+    pub(super) local_mps2: f64,
+}
 
 /// What is asked for at a place and time: the value, its variance, and what it hangs on.
 struct Asked {
     value_mps: f64,
     variance: f64,
+    /// The part of it that the values around leave.
+    local: f64,
     /// By the common errors, with the drones' constants following them.
     by_common: CommonVector,
     /// By the constants.
@@ -84,12 +92,17 @@ impl Model<'_> {
         places_m: &[[f64; 3]],
         first: usize,
         step: usize,
-    ) -> Vec<(usize, Vec<Known>)> {
+    ) -> Vec<(usize, Vec<Option<Known>>)> {
         let sites: Vec<(Option<usize>, [f64; 3])> =
             places_m.iter().map(|place| (None, *place)).collect();
         let found = self.phase(&sites, first, step).into_iter();
-        let known =
-            |asked: Option<Asked>| asked.map(|asked| (asked.value_mps, asked.variance.sqrt()));
+        let known = |asked: Option<Asked>| {
+            asked.map(|asked| Known {
+                mean_mps: asked.value_mps,
+                sd_mps: asked.variance.sqrt(),
+                local_mps2: asked.local,
+            })
+        };
         found.map(|(second, asked)| (second, asked.into_iter().map(known).collect())).collect()
     }
 
@@ -158,12 +171,9 @@ impl Model<'_> {
         Some((mean + self.linear.mean[UNIFORM], variance.sqrt()))
     }
 
-    /// What is not known of the air where no drone is near, m/s.
+    /// What is not known of the air where no drone is near, without what is everywhere the same, m/s.
     pub(super) fn unknown_mps(&self) -> f64 {
-        let mut uniform = CommonVector::zeros();
-        uniform[UNIFORM] = 1.0;
-        let uniform = self.linear.variance(&uniform, &[]);
-        (self.covariance.field([0.0; 3], 0.0) + self.covariance.gusts(0.0) + uniform).sqrt()
+        (self.covariance.field([0.0; 3], 0.0) + self.covariance.gusts(0.0)).sqrt()
     }
 
     fn own(&self, drone: usize) -> f64 {
@@ -204,7 +214,8 @@ impl Model<'_> {
         let linear = self.linear.variance(&by_common, &by_own);
         // Where nobody measured there are gusts, too.
         let gusts = if drone.is_some() { 0.0 } else { self.covariance.gusts(0.0) };
-        Asked { value_mps, variance: weights.variance + linear + gusts, by_common, by_own }
+        let local = weights.variance + gusts;
+        Asked { value_mps, variance: local + linear, local, by_common, by_own }
     }
 }
 
