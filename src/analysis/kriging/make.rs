@@ -9,7 +9,7 @@ use super::levinson::{Blocks, Size};
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
-use super::sampling::{Sampled, samples};
+use super::sampling::{Drawn, Sampled, samples};
 use super::scales::{Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, log_prior, open_factor};
 use super::thermals::{Record, Thermal};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
@@ -156,11 +156,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         let components = input.calibration.components(&air);
         mixed([(1.0, choices(&system, &components).as_slice())].into_iter())?
     } else {
-        let all = log_sum(sampled.iter().map(|(_, sampled)| sampled.ln_evidence));
-        mixed(sampled.iter().flat_map(|(_, sampled)| {
-            let share = (sampled.ln_evidence - all).exp();
-            sampled.drawn.iter().map(move |drawn| (share * drawn.weight, drawn.kept.as_slice()))
-        }))?
+        mixed(weighed(&sampled).map(|(weight, drawn)| (weight, drawn.kept.as_slice())))?
     };
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
@@ -283,17 +279,22 @@ fn mixed<'a>(
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
 }
 
+/// All points of all forms, which weigh by their evidence; weights add up to one.
+fn weighed<'a>(
+    sampled: &'a [(&Found, Sampled<Vec<Choice>>)],
+) -> impl Iterator<Item = (f64, &'a Drawn<Vec<Choice>>)> {
+    let all = log_sum(sampled.iter().map(|(_, sampled)| sampled.ln_evidence));
+    sampled.iter().flat_map(move |(_, sampled)| {
+        let share = (sampled.ln_evidence - all).exp();
+        sampled.drawn.iter().map(move |drawn| (share * drawn.weight, drawn))
+    })
+}
+
 /// A scale that is searched as a logarithm, over all points and forms: its mean, and 1.96 standard deviations to each side,
 /// of which one is that of the points on this side.
 fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
-    let all = log_sum(sampled.iter().map(|(_, sampled)| sampled.ln_evidence));
-    let points: Vec<(f64, f64)> = sampled
-        .iter()
-        .flat_map(|(_, sampled)| {
-            let share = (sampled.ln_evidence - all).exp();
-            sampled.drawn.iter().map(move |drawn| (share * drawn.weight, drawn.point[index]))
-        })
-        .collect();
+    let points: Vec<(f64, f64)> =
+        weighed(sampled).map(|(weight, drawn)| (weight, drawn.point[index])).collect();
     let mean: f64 = points.iter().map(|(weight, value)| weight * value).sum();
     let side = |sign: f64| {
         let beyond = || points.iter().filter(move |(_, value)| sign * (value - mean) > 0.0);
