@@ -19,11 +19,13 @@
 //! assert_eq!((line.slope(), line.intercept()), (2.0, 1.0));
 //! ```
 
+mod banded;
 mod line;
 mod minimise;
 mod moments;
 mod order;
 
+pub(crate) use banded::Banded;
 pub use line::Line;
 pub(crate) use minimise::{differences, minimise};
 pub use moments::{Moments, mean, rms};

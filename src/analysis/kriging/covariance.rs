@@ -185,7 +185,7 @@ impl Covariance {
     }
 
     /// Covariance of the slow part, which means over 10 s do not change, (m/s)².
-    fn slow(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+    pub(super) fn slow(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
         let Air { slow_mps, drift_mps: [u, v], .. } = self.air;
         if slow_mps == 0.0 {
             return 0.0;
@@ -196,13 +196,18 @@ impl Covariance {
             * (-(x * x + y * y + z * z).sqrt() / SLOW_M - apart_s.abs() / SLOW_S).exp()
     }
 
-    /// Covariance of the field itself, not of means, (m/s)².
+    /// Covariance of the air itself, not of means, (m/s)².
     pub(super) fn instant(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
+        self.instant_field(apart_m, apart_s) + self.slow(apart_m, apart_s)
+    }
+
+    /// The same of the field alone, without the slow part.
+    pub(super) fn instant_field(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
         let [x, y, z] = apart_m;
         let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
         let r = self.distance([x - u * apart_s, y - v * apart_s, z]);
         let t = apart_s.abs() / time_s;
-        sd_mps * sd_mps * form.correlation(r, t) + self.slow(apart_m, apart_s)
+        sd_mps * sd_mps * form.correlation(r, t)
     }
 
     /// Covariance of a drone's own gusts, (m/s)².

@@ -5,12 +5,13 @@ use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
 use super::data::{Drone, Rows, UNIFORM};
 use super::grid::{Grid, grid};
-use super::levinson::{Blocks, Size};
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
 use super::sampling::{Drawn, Sampled, samples};
-use super::scales::{Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, log_prior, open_factor};
+use super::scales::{
+    COARSE, FINE, Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, Whole, log_prior, open_factor,
+};
 use super::thermals::{Record, Thermal};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
 use crate::analysis::corrections::DOUBTS;
@@ -20,10 +21,6 @@ use crate::numeric::rms;
 
 /// What the likelihood conditions on.
 const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
-/// What the scales and the zero of a hover are found by. Numerical: 16 drones, and the 300 s before a value.
-const FINE: Size = Size { drones: 16, operations: 12e6 };
-/// What the search begins with.
-const COARSE: Size = Size { drones: 9, operations: 2e6 };
 /// Standard deviations to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
 /// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
@@ -80,7 +77,7 @@ pub(in super::super) struct Posterior {
 }
 
 /// One choice of everything that is not linear, with what follows.
-struct Choice {
+pub(super) struct Choice {
     log_weight: f64,
     solved: Solved,
     is_uniform: bool,
@@ -96,17 +93,16 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     }
     let moves = input.drones.iter().any(|drone| !drone.hovers());
     let all = before(input.drones, &rows, if moves { moving::REACH } else { REACH });
-    let neighbours = if moves { moving::thinned(&all) } else { all.clone() };
     let roughly: Vec<f64> =
         input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();
     let slope_share = rms(input.drones.iter().map(|drone| drone.own_slope_share)).unwrap_or(0.0);
-    let blocks = Blocks::of(input.drones, &rows, FINE);
-    let coarse = blocks.is_some().then(|| Blocks::of(input.drones, &rows, COARSE)).flatten();
+    let (fine, coarse) =
+        (Whole::of(input.drones, &rows, FINE), Whole::of(input.drones, &rows, COARSE));
     let search = Search {
         rows: &rows,
-        neighbours: &neighbours,
-        blocks: blocks.as_ref(),
-        coarse: coarse.as_ref(),
+        neighbours: &all,
+        whole: Some(&fine),
+        coarse: Some(&coarse),
         own_mps: &roughly,
         slope_share,
         wind_mps: input.wind_mps,
@@ -122,7 +118,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     }
     let found = forms.first()?;
     let record = Record {
-        search: &Search { blocks: None, coarse: None, ..search },
+        search: &Search { whole: None, coarse: None, ..search },
         drones: input.drones,
         found,
         wind_mps: input.wind_mps,
@@ -133,11 +129,9 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         let own = input.calibration.own_us(air) / input.slope.max(1.0);
         input.drones.iter().map(|drone| drone.own_mps().max(own)).collect()
     };
-    let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> = if moves {
-        Vec::new()
-    } else {
-        forms.iter().map(|found| (found, sampled(&search, input, found, &own_of))).collect()
-    };
+    let components = |air: &Air| input.calibration.components(air);
+    let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> =
+        forms.iter().map(|found| (found, sampled(&search, found, &components, &own_of))).collect();
     let found = sampled
         .iter()
         .max_by(|a, b| a.1.ln_evidence.total_cmp(&b.1.ln_evidence))
@@ -145,19 +139,10 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let air = search.air(found.form, &found.best);
     let own_mps = own_of(&air);
     let search = Search { own_mps: &own_mps, ..search };
-    let of_scale = |index: usize| {
-        if sampled.is_empty() { scale(&search, found, index) } else { averaged(&sampled, index) }
-    };
-    let (length_m, time_s) = (of_scale(LN_LENGTH), of_scale(LN_TIME));
-    let search = Search { neighbours: &all, blocks: None, ..search };
+    let (length_m, time_s) = (averaged(&sampled, LN_LENGTH), averaged(&sampled, LN_TIME));
+    let search = Search { whole: None, ..search };
     let system = search.system(found.form, &found.best)?;
-    let (mean, covariance, uniform_probability) = if moves {
-        // With all values: the search had only some.
-        let components = input.calibration.components(&air);
-        mixed([(1.0, choices(&system, &components).as_slice())].into_iter())?
-    } else {
-        mixed(weighed(&sampled).map(|(weight, drawn)| (weight, drawn.kept.as_slice())))?
-    };
+    let (mean, covariance, uniform_probability) = over_all(&sampled)?;
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
     let model =
@@ -190,18 +175,17 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
 }
 
 /// What the values allow of the scales of one form, with what each choice of them says about everything linear.
-fn sampled(
+pub(super) fn sampled(
     search: &Search<'_>,
-    input: &Input<'_>,
     found: &Found,
+    components: &(dyn Fn(&Air) -> Vec<Component> + Sync),
     own_of: &dyn Fn(&Air) -> Vec<f64>,
 ) -> Sampled<Vec<Choice>> {
     let own_mps = own_of(&search.air(found.form, &found.best));
     let search = Search { own_mps: &own_mps, ..*search };
     samples(found, |point| {
         let system = search.system(found.form, point)?;
-        let components = input.calibration.components(&search.air(found.form, point));
-        let choices = choices(&system, &components);
+        let choices = choices(&system, &components(&search.air(found.form, point)));
         let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
         Some((log_likelihood + log_prior(point), choices))
     })
@@ -279,6 +263,13 @@ fn mixed<'a>(
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
 }
 
+/// What all points of all forms say of the common errors: mean, covariance, and the weight of a uniform updraft.
+pub(super) fn over_all(
+    sampled: &[(&Found, Sampled<Vec<Choice>>)],
+) -> Option<(CommonVector, Common, f64)> {
+    mixed(weighed(sampled).map(|(weight, drawn)| (weight, drawn.kept.as_slice())))
+}
+
 /// All points of all forms, which weigh by their evidence; weights add up to one.
 fn weighed<'a>(
     sampled: &'a [(&Found, Sampled<Vec<Choice>>)],
@@ -304,11 +295,6 @@ fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
     };
     let interval = [mean - NORMAL * side(-1.0), mean + NORMAL * side(1.0)];
     Scale { value: mean.exp(), interval: interval.map(f64::exp) }
-}
-
-/// A scale that is searched as a logarithm.
-fn scale(search: &Search<'_>, found: &Found, index: usize) -> Scale {
-    Scale { value: found.best[index].exp(), interval: search.interval(found, index).map(f64::exp) }
 }
 
 fn adequate(model: &Model<'_>, rows: &Rows, neighbours: &Neighbours) -> Adequacy {

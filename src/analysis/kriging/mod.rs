@@ -16,6 +16,7 @@ mod along;
 mod calibration;
 mod covariance;
 mod data;
+mod dense;
 mod grid;
 mod levinson;
 mod limit;
@@ -28,6 +29,8 @@ mod predict;
 mod sampling;
 mod scales;
 mod thermals;
+#[cfg(test)]
+mod thousands_tests;
 mod vecchia;
 
 pub(super) use calibration::Calibration;

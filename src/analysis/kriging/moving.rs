@@ -3,14 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::neighbours::{Neighbours, Reach};
+use super::neighbours::Reach;
 use super::scales::{DRIFT, Found, Search};
 use crate::numeric::{differences, minimise};
 
 /// What the likelihood of drones that move conditions on.
 pub(super) const REACH: Reach = Reach { beside: 6, step: 4, own: 2 };
-/// Values that scales are found by, at most: each has weights of its own. 300 of them know a length to 15 %.
-const TARGETS: usize = 300;
 /// Drifts that are tried along each axis, m/s.
 const TRIED_MPS: [f64; 5] = [-4.0, -2.0, 0.0, 2.0, 4.0];
 /// A drift of a field before the values are seen: standard deviation of each component, m/s. Winds that small drones
@@ -18,24 +16,6 @@ const TRIED_MPS: [f64; 5] = [-4.0, -2.0, 0.0, 2.0, 4.0];
 const DRIFT_MPS: f64 = 3.0;
 /// A drift must explain so much more than none, nats. Two more numbers are worth 3 in 95 % of all cases.
 const WORTH: f64 = 3.0;
-/// The golden ratio's part after the point: multiples of it fill the unit interval evenly.
-const GOLDEN: f64 = 0.618_033_988_749_895;
-
-/// Some of the targets, spread evenly over all.
-pub(super) fn thinned(all: &Neighbours) -> Neighbours {
-    let share = TARGETS as f64 / all.of.len().max(1) as f64;
-    if share >= 1.0 {
-        return all.clone();
-    }
-    let mut some = Neighbours { rows: all.rows.clone(), ..Neighbours::default() };
-    for (index, pattern) in all.of.iter().enumerate() {
-        let is_kept = (index as f64 * GOLDEN).fract() < share;
-        some.of.push(if is_kept { some.patterns.len() } else { Neighbours::SKIPPED });
-        some.patterns.extend(is_kept.then(|| all.patterns[*pattern].clone()));
-    }
-    some
-}
-
 /// How fast the field drifts, m/s, if that explains more than that it stays.
 pub(super) fn drift(search: &Search<'_>, found: &Found) -> Option<[f64; 2]> {
     let mut point = found.best;

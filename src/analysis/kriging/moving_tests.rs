@@ -1,14 +1,17 @@
 //! Maps along tracks, in fields that are made of waves: means over 10 s along the way, once a second, with noise.
 
+use nalgebra::DMatrix;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::covariance::Covariance;
+use super::calibration::Component;
+use super::covariance::{Air, Covariance};
 use super::data::{Drone, Rows, UNIFORM, Value};
+use super::make::{over_all, sampled};
 use super::moving;
 use super::neighbours::before;
 use super::predict::{Linear, Model, Series};
-use super::scales::Search;
-use super::vecchia::{Common, CommonVector};
+use super::scales::{COARSE, FINE, Search, Whole};
+use super::vecchia::Common;
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::shape::PARAMETERS;
 use crate::base::rng::{Purpose, stream};
@@ -25,31 +28,31 @@ const TURN_S: usize = 8;
 const SPEED_MPS: f64 = 4.0;
 
 #[derive(Clone, Copy, Debug)]
-struct Case {
-    side: usize,
-    legs: usize,
-    heights_m: [f64; 2],
-    length_m: f64,
-    time_s: f64,
-    drift_mps: [f64; 2],
-    gust_mps: f64,
+pub(super) struct Case {
+    pub(super) side: usize,
+    pub(super) legs: usize,
+    pub(super) heights_m: [f64; 2],
+    pub(super) length_m: f64,
+    pub(super) time_s: f64,
+    pub(super) drift_mps: [f64; 2],
+    pub(super) gust_mps: f64,
 }
 
 /// A field with the correlation `exp(-(r/length)² - (t/time)²)`, sd 0.5 m/s.
-struct Field {
+pub(super) struct Field {
     waves: Vec<[f64; 5]>,
     drift_mps: [f64; 2],
 }
 
 impl Field {
-    fn new(case: &Case, mut normal: impl FnMut() -> f64) -> Self {
+    pub(super) fn new(case: &Case, mut normal: impl FnMut() -> f64) -> Self {
         let (k, rate) = (2.0_f64.sqrt() / case.length_m, 2.0_f64.sqrt() / case.time_s);
         let wave =
             |_| [k * normal(), k * normal(), k * normal(), rate * normal(), 100.0 * normal()];
         Self { waves: (0..WAVES).map(wave).collect(), drift_mps: case.drift_mps }
     }
 
-    fn at(&self, [x, y, z]: [f64; 3], time_s: f64) -> f64 {
+    pub(super) fn at(&self, [x, y, z]: [f64; 3], time_s: f64) -> f64 {
         let (x, y) = (x - self.drift_mps[0] * time_s, y - self.drift_mps[1] * time_s);
         let of = |[a, b, c, rate, phase]: &[f64; 5]| {
             (a * x + b * y + c * z + rate * time_s + phase).cos()
@@ -121,42 +124,42 @@ fn mapped(drones: &[Drone]) -> Vec<Series> {
     let seconds = drones[0].values.len();
     let rows = Rows::of(drones, 5, 10);
     let all = before(drones, &rows, moving::REACH);
-    let some = moving::thinned(&all);
+    let (fine, coarse) = (Whole::of(drones, &rows, FINE), Whole::of(drones, &rows, COARSE));
     let own_mps = vec![OWN_MPS; drones.len()];
     let mut factor = Common::zeros();
     factor[(UNIFORM, UNIFORM)] = 3.0;
     let mut search = Search {
         rows: &rows,
-        neighbours: &some,
-        blocks: None,
-        coarse: None,
+        neighbours: &all,
+        whole: Some(&fine),
+        coarse: Some(&coarse),
         own_mps: &own_mps,
         slope_share: 0.0,
         wind_mps: None,
         factor,
     };
-    let mut found = search.best().unwrap();
-    search.wind_mps = moving::drift(&search, &found);
+    let mut forms = search.all();
+    search.wind_mps = moving::drift(&search, &forms[0]);
     if search.wind_mps.is_some() {
-        found = search.best().unwrap();
+        forms = search.all();
     }
-    let air = search.air(found.form, &found.best);
+    let zero = |_: &Air| {
+        let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        covariance[(0, 0)] = ZERO_MPS * ZERO_MPS;
+        vec![Component { shift: [0.0; PARAMETERS], covariance, log_weight: 0.0 }]
+    };
+    let own_of = |_: &Air| own_mps.clone();
+    let sampled: Vec<_> =
+        forms.iter().map(|found| (found, sampled(&search, found, &zero, &own_of))).collect();
+    let (mean, covariance, _) = over_all(&sampled).unwrap();
+    let air = search.air(forms[0].form, &forms[0].best);
     if std::env::var("UPDRAFT_EACH").is_ok() {
         println!("{air:?}");
     }
-    let search = Search { neighbours: &all, ..search };
-    let system = search.system(found.form, &found.best).unwrap();
-    factor[(UNIFORM, UNIFORM)] = 0.0;
-    factor[(0, 0)] = ZERO_MPS;
-    let solved = system.posterior(&CommonVector::zeros(), &factor).unwrap();
+    let search = Search { whole: None, ..search };
+    let system = search.system(forms[0].form, &forms[0].best).unwrap();
     let (own, answers) = system.own();
-    let linear = Linear {
-        mean: solved.mean,
-        covariance: solved.covariance,
-        own,
-        answers,
-        own_covariance: system.own_covariance(),
-    };
+    let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
     let model = Model { drones, covariance: Covariance::new(air), linear };
     let sites: Vec<(Option<usize>, [f64; 3])> =
         (0..drones.len()).map(|index| (Some(index), drones[index].place_m[0])).collect();

@@ -41,11 +41,6 @@ pub(super) struct Neighbours {
     pub(super) rows: Vec<Vec<u32>>,
 }
 
-impl Neighbours {
-    /// Pattern of what is no target.
-    pub(super) const SKIPPED: usize = usize::MAX;
-}
-
 /// Noise in steps of a quarter: what differs by less is one pattern.
 fn noise_step(noise_mps: f64) -> i32 {
     (4.0 * noise_mps.log2()).round() as i32

@@ -1,5 +1,7 @@
 //! The air at drones, and between them, after all values were seen (kriging with estimated constants).
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -68,21 +70,23 @@ impl Model<'_> {
     /// The air at sites (a drone, or a fixed place) over the record of so many seconds.
     pub(super) fn at(&self, sites: &[(Option<usize>, [f64; 3])], seconds: usize) -> Vec<Series> {
         let step = RUNNING_S as usize;
-        let phases: Vec<Vec<(usize, Vec<Option<Asked>>)>> = (0..step.min(seconds))
+        let phases: Vec<Vec<Gathered>> = (0..step.min(seconds))
             .into_par_iter()
-            .map(|phase| self.phase(sites, phase, step))
-            .collect();
-        let mut found: Vec<Gathered> = sites.iter().map(|_| Gathered::new(seconds)).collect();
-        for phase in phases {
-            for (second, asked) in phase {
-                for (site, asked) in found.iter_mut().zip(asked) {
+            .map(|phase| {
+                let mut found = vec![Gathered::default(); sites.len()];
+                self.phase(sites, phase, step, |_, second, site, asked| {
                     if let Some(asked) = asked {
-                        site.add(second, &asked);
+                        found[site].add(second, &asked);
                     }
-                }
-            }
+                });
+                found
+            })
+            .collect();
+        let mut found = vec![Gathered::default(); sites.len()];
+        for phase in phases {
+            found.iter_mut().zip(phase).for_each(|(all, part)| all.join(part));
         }
-        found.into_iter().map(|site| site.series(&self.linear)).collect()
+        found.into_par_iter().map(|site| site.series(&self.linear, seconds)).collect()
     }
 
     /// The air at fixed places: for each `step` seconds from `first` on the second, and mean and standard deviation at
@@ -95,24 +99,32 @@ impl Model<'_> {
     ) -> Vec<(usize, Vec<Option<Known>>)> {
         let sites: Vec<(Option<usize>, [f64; 3])> =
             places_m.iter().map(|place| (None, *place)).collect();
-        let found = self.phase(&sites, first, step).into_iter();
-        let known = |asked: Option<Asked>| {
-            asked.map(|asked| Known {
+        let mut found: Vec<(usize, Vec<Option<Known>>)> = Vec::new();
+        self.phase(&sites, first, step, |block, second, site, asked| {
+            if site == 0 {
+                found.push((second, Vec::with_capacity(sites.len())));
+            }
+            let known = asked.map(|asked| Known {
                 mean_mps: asked.value_mps,
                 sd_mps: asked.variance.sqrt(),
                 local_mps2: asked.local,
-            })
-        };
-        found.map(|(second, asked)| (second, asked.into_iter().map(known).collect())).collect()
+            });
+            if let Some((_, places)) = found.get_mut(block) {
+                places.push(known);
+            }
+        });
+        found
     }
 
-    /// All sites at one second of each step.
+    /// All sites at one second of each step: what is asked for is handed on with the step, its second and the site, all
+    /// seconds of one site after another (what is known of its drones' constants is looked up for all of them).
     fn phase(
         &self,
         sites: &[(Option<usize>, [f64; 3])],
         phase: usize,
         step: usize,
-    ) -> Vec<(usize, Vec<Option<Asked>>)> {
+        mut take: impl FnMut(usize, usize, usize, Option<Asked>),
+    ) {
         let rows = Rows::of(self.drones, phase, step);
         let near = around(self.drones, &rows, sites, REACH);
         let weights: Vec<Option<Weights>> =
@@ -122,20 +134,15 @@ impl Model<'_> {
             .iter()
             .map(|row| self.left(row.spot.drone, &row.common, row.value_mps))
             .collect();
-        rows.seconds
-            .iter()
-            .enumerate()
-            .map(|(block, second)| {
-                let asked = (0..sites.len())
-                    .map(|site| {
-                        let target = block * sites.len() + site;
-                        let weights = weights[near.of[target]].as_ref()?;
-                        Some(self.asked(sites[site].0, weights, &near.rows[target], &rows, &left))
-                    })
-                    .collect();
-                (*second, asked)
-            })
-            .collect()
+        for (site, (drone, _)) in sites.iter().enumerate() {
+            for (block, second) in rows.seconds.iter().enumerate() {
+                let target = block * sites.len() + site;
+                let asked = weights[near.of[target]]
+                    .as_ref()
+                    .map(|weights| self.asked(*drone, weights, &near.rows[target], &rows, &left));
+                take(block, *second, site, asked);
+            }
+        }
     }
 
     /// A value less all that is linear: the field and gusts.
@@ -258,53 +265,52 @@ impl Series {
     }
 }
 
-/// What was asked for at one site, second by second.
+/// What was asked for at one site.
+#[derive(Clone, Debug, Default)]
 struct Gathered {
-    series: Series,
-    count: f64,
-    sum: f64,
-    variances: f64,
+    /// Second, value and variance.
+    values: Vec<(usize, f64, f64)>,
     by_common: CommonVector,
-    by_own: std::collections::BTreeMap<usize, f64>,
+    by_own: BTreeMap<usize, f64>,
 }
 
 impl Gathered {
-    fn new(seconds: usize) -> Self {
-        let series =
-            Series { mean_mps: vec![None; seconds], sd_mps: vec![None; seconds], over_all: None };
-        Self {
-            series,
-            count: 0.0,
-            sum: 0.0,
-            variances: 0.0,
-            by_common: CommonVector::zeros(),
-            by_own: std::collections::BTreeMap::new(),
-        }
-    }
-
     fn add(&mut self, second: usize, asked: &Asked) {
-        self.series.mean_mps[second] = Some(asked.value_mps);
-        self.series.sd_mps[second] = Some(asked.variance.sqrt());
-        self.count += 1.0;
-        self.sum += asked.value_mps;
-        self.variances += asked.variance;
+        self.values.push((second, asked.value_mps, asked.variance));
         self.by_common += asked.by_common;
         for (drone, by) in &asked.by_own {
             *self.by_own.entry(*drone).or_default() += by;
         }
     }
 
-    fn series(mut self, linear: &Linear) -> Series {
-        if self.count > 0.0 {
-            let n = self.count;
-            let by_own: Vec<(usize, f64)> =
-                self.by_own.into_iter().map(|(drone, by)| (drone, by / n)).collect();
-            let by_common = self.by_common / n;
-            let linear = linear.variance(&by_common, &by_own);
-            // What kriging leaves lasts about as long as its windows.
-            let rest = (self.variances / n - linear).max(0.0) * (RUNNING_S / n).min(1.0);
-            self.series.over_all = Some((self.sum / n, (linear + rest).sqrt()));
+    fn join(&mut self, other: Self) {
+        self.values.extend(other.values);
+        self.by_common += other.by_common;
+        for (drone, by) in other.by_own {
+            *self.by_own.entry(drone).or_default() += by;
         }
-        self.series
+    }
+
+    fn series(self, linear: &Linear, seconds: usize) -> Series {
+        let mut series =
+            Series { mean_mps: vec![None; seconds], sd_mps: vec![None; seconds], over_all: None };
+        if self.values.is_empty() {
+            return series;
+        }
+        let n = self.values.len() as f64;
+        let (mut sum, mut variances) = (0.0, 0.0);
+        for (second, value_mps, variance) in &self.values {
+            series.mean_mps[*second] = Some(*value_mps);
+            series.sd_mps[*second] = Some(variance.sqrt());
+            sum += value_mps;
+            variances += variance;
+        }
+        let by_own: Vec<(usize, f64)> =
+            self.by_own.into_iter().map(|(drone, by)| (drone, by / n)).collect();
+        let linear = linear.variance(&(self.by_common / n), &by_own);
+        // What kriging leaves lasts about as long as its windows.
+        let rest = (variances / n - linear).max(0.0) * (RUNNING_S / n).min(1.0);
+        series.over_all = Some((sum / n, (linear + rest).sqrt()));
+        series
     }
 }

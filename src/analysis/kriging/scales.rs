@@ -5,8 +5,9 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::covariance::{Air, Covariance, Form};
-use super::data::{Rows, UNIFORM};
-use super::levinson::Blocks;
+use super::data::{Drone, Rows, UNIFORM};
+use super::dense::Dense;
+use super::levinson::{Blocks, Size};
 use super::neighbours::Neighbours;
 use super::vecchia::{Common, CommonVector, System};
 use crate::numeric::{differences, minimise};
@@ -64,21 +65,58 @@ const COARSE_NATS: f64 = 12.0;
 const LEAST_REACH: f64 = 0.5;
 /// See [`Axis::reach`]. Numerical.
 const MOST_REACH: f64 = 3.0;
-/// Steps of the line on which a scale's interval is found, standard deviations, and how many to the lower side; twice as
-/// many to the upper one, where tails are longer. Numerical.
-const LINE_STEP: f64 = 0.35;
-/// See [`LINE_STEP`].
-const LINE_STEPS: i32 = 12;
+/// Values that are solved at once.
+#[derive(Clone, Debug)]
+pub(super) enum Whole {
+    /// Of drones that stand still, at equal steps of time.
+    Blocks(Blocks),
+    /// Of any drones.
+    Dense(Dense),
+}
+
+/// How much of a record is solved at once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    pub(super) blocks: Size,
+    /// Values of a record that is no stationary one.
+    pub(super) values: usize,
+}
+
+/// What scales and zero are found by. Numerical: of a hover 16 drones, and the 300 s before a value; of others 300 values,
+/// which know a length to 15 %.
+pub(super) const FINE: Extent =
+    Extent { blocks: Size { drones: 16, operations: 12e6 }, values: 300 };
+/// What the search begins with.
+pub(super) const COARSE: Extent =
+    Extent { blocks: Size { drones: 9, operations: 2e6 }, values: 100 };
+
+impl Whole {
+    /// Of a record of these drones.
+    pub(super) fn of(drones: &[Drone], rows: &Rows, extent: Extent) -> Self {
+        match Blocks::of(drones, rows, extent.blocks) {
+            Some(blocks) => Self::Blocks(blocks),
+            None => Self::Dense(Dense::of(rows, extent.values)),
+        }
+    }
+
+    /// The likelihood with everything linear left open.
+    fn system(&self, covariance: &Covariance, own_mps: &[f64]) -> Option<System> {
+        match self {
+            Self::Blocks(blocks) => blocks.system(covariance, own_mps),
+            Self::Dense(dense) => dense.system(covariance, own_mps),
+        }
+    }
+}
 
 /// The likelihood of a record in its scales.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub(super) rows: &'a Rows,
     pub(super) neighbours: &'a Neighbours,
-    /// All values at once, where that can be had.
-    pub(super) blocks: Option<&'a Blocks>,
-    /// Some of them, to begin a search with.
-    pub(super) coarse: Option<&'a Blocks>,
+    /// Values that are solved at once; none: each by its neighbours.
+    pub(super) whole: Option<&'a Whole>,
+    /// Fewer of them, to begin a search with.
+    pub(super) coarse: Option<&'a Whole>,
     pub(super) own_mps: &'a [f64],
     /// Standard error of the drones' own slopes as a share of them.
     pub(super) slope_share: f64,
@@ -93,8 +131,6 @@ pub(super) struct Search<'a> {
 pub(super) struct Found {
     pub(super) form: Form,
     pub(super) best: Point,
-    /// Logarithm of the posterior there.
-    log_posterior: f64,
     /// Covariance of the scales.
     pub(super) covariance: SMatrix<f64, SCALES, SCALES>,
     /// How far the posterior reaches to both sides of its top.
@@ -123,7 +159,7 @@ impl Found {
             along[axis] = covariance[(axis, axis)].sqrt();
             Axis { along, reach: [1.0; 2] }
         });
-        Self { form, best, log_posterior: 0.0, covariance: *covariance, axes: axes.collect() }
+        Self { form, best, covariance: *covariance, axes: axes.collect() }
     }
 }
 
@@ -152,10 +188,14 @@ impl Search<'_> {
         if outside(point) > 0.0 {
             return None;
         }
-        let covariance = Covariance::new(self.air(form, point)).shown(self.slope_share);
-        match self.blocks {
-            Some(blocks) => blocks.system(&covariance, self.own_mps),
-            None => System::new(self.rows, self.neighbours, &covariance, self.own_mps),
+        self.system_in(&Covariance::new(self.air(form, point)).shown(self.slope_share))
+    }
+
+    /// The likelihood in the air of a covariance.
+    pub(super) fn system_in(&self, covariance: &Covariance) -> Option<System> {
+        match self.whole {
+            Some(whole) => whole.system(covariance, self.own_mps),
+            None => System::new(self.rows, self.neighbours, covariance, self.own_mps),
         }
     }
 
@@ -174,7 +214,7 @@ impl Search<'_> {
 
     /// The most probable scales from a start, by some of the values where that is enough to begin with.
     fn climb(&self, form: Form, start: Point) -> (Point, f64) {
-        let some = Search { blocks: self.coarse.or(self.blocks), ..*self };
+        let some = Search { whole: self.coarse.or(self.whole), ..*self };
         let loss = |point: &Point| -some.log_posterior(form, point);
         minimise(start, loss, |at, value| differences(loss, at, value))
     }
@@ -225,7 +265,7 @@ impl Search<'_> {
             .map(|(form, best, log_posterior)| {
                 let covariance = self.curvature(form, &best, log_posterior);
                 let axes = self.axes(form, &best, log_posterior, &covariance);
-                Found { form, best, log_posterior, covariance, axes }
+                Found { form, best, covariance, axes }
             })
             .collect()
     }
@@ -307,35 +347,6 @@ impl Search<'_> {
                 reach: [reach[0], reach[1]],
             })
             .collect()
-    }
-
-    /// The 95 % interval of one scale: the posterior along the line on which all others follow it.
-    pub(super) fn interval(&self, found: &Found, index: usize) -> [f64; 2] {
-        let sd = found.covariance[(index, index)].max(1e-12).sqrt();
-        let along = found.covariance.column(index) / sd;
-        let steps: Vec<f64> =
-            (-LINE_STEPS..=2 * LINE_STEPS).map(|step| f64::from(step) * LINE_STEP).collect();
-        let density: Vec<f64> = steps
-            .par_iter()
-            .map(|step| {
-                let mut point = found.best;
-                point.iter_mut().zip(along.iter()).for_each(|(own, by)| *own += step * by);
-                (self.log_posterior(found.form, &point) - found.log_posterior).min(1.0).exp()
-            })
-            .collect();
-        let all: f64 = density.iter().sum();
-        let at = |share: f64| {
-            let mut sum = 0.0;
-            for (step, density) in steps.iter().zip(&density) {
-                if sum + density >= share * all {
-                    let inner = (share * all - sum) / density.max(f64::MIN_POSITIVE) - 0.5;
-                    return found.best[index] + sd * (step + inner * LINE_STEP);
-                }
-                sum += density;
-            }
-            found.best[index] + sd * steps.last().copied().unwrap_or_default()
-        };
-        [at(0.025), at(0.975)]
     }
 }
 

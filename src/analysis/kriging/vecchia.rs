@@ -6,6 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, SVector};
 use super::covariance::Covariance;
 use super::data::{COMMON, Rows};
 use super::neighbours::{Neighbours, Pattern};
+use crate::numeric::Banded;
 
 /// Square matrix over the common errors.
 pub(super) type Common = SMatrix<f64, COMMON, COMMON>;
@@ -91,6 +92,59 @@ impl Parts {
     }
 }
 
+/// More drones than this are solved by bands: their constants are coupled with those of drones nearby.
+const BANDED: usize = 256;
+
+/// The factor of the information about drones' constants.
+#[derive(Clone, Debug)]
+enum Constants {
+    Dense(Cholesky<f64, Dyn>),
+    Banded(Banded),
+}
+
+impl Constants {
+    fn factor(information: DMatrix<f64>) -> Option<Self> {
+        if information.nrows() > BANDED {
+            return Banded::factor(&information).map(Self::Banded);
+        }
+        information.cholesky().map(Self::Dense)
+    }
+
+    fn ln_diagonal(&self) -> f64 {
+        match self {
+            Self::Dense(factor) => {
+                factor.l_dirty().diagonal().iter().map(|value: &f64| value.ln()).sum()
+            }
+            Self::Banded(factor) => factor.ln_diagonal(),
+        }
+    }
+
+    fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::Dense(factor) => factor.solve(right),
+            Self::Banded(factor) => factor.solve(right),
+        }
+    }
+
+    fn solve_vector(&self, right: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Dense(factor) => factor.solve(right),
+            Self::Banded(factor) => {
+                let solved =
+                    factor.solve(&DMatrix::from_column_slice(right.len(), 1, right.as_slice()));
+                solved.column(0).into_owned()
+            }
+        }
+    }
+
+    fn inverse(&self) -> DMatrix<f64> {
+        match self {
+            Self::Dense(factor) => factor.inverse(),
+            Self::Banded(factor) => factor.inverse(),
+        }
+    }
+}
+
 /// The likelihood with everything linear left open.
 #[derive(Clone, Debug)]
 pub(super) struct System {
@@ -102,7 +156,7 @@ pub(super) struct System {
     score: CommonVector,
     /// The drones' constants: factor of their information with the prior, its product with the common errors, and its
     /// score.
-    own: Cholesky<f64, Dyn>,
+    own: Constants,
     own_common: DMatrix<f64>,
     own_score: DVector<f64>,
 }
@@ -130,10 +184,7 @@ impl System {
         let mut parts = Parts::new(own_mps.len());
         let mut constants: Vec<(usize, f64)> = Vec::new();
         for (index, row) in rows.list.iter().enumerate() {
-            // What is skipped is no target, but others may be conditioned on it.
-            let Some(Weights { of, variance }) = weights.get(neighbours.of[index]) else {
-                continue;
-            };
+            let Weights { of, variance } = weights.get(neighbours.of[index])?;
             let inverse = 1.0 / variance.sqrt();
             parts.ln_sd -= inverse.ln();
             let mut value = row.value_mps;
@@ -180,13 +231,13 @@ impl System {
             own[(drone, drone)] += 1.0 / (sd * sd);
             ln_sd += sd.ln();
         }
-        let own = own.cholesky()?;
-        let ln_own: f64 = own.l_dirty().diagonal().iter().map(|value: &f64| value.ln()).sum();
+        let own = Constants::factor(own)?;
+        let ln_own = own.ln_diagonal();
         let solved = own.solve(&own_common);
         let information = information
             - Common::from_fn(|row, column| own_common.column(row).dot(&solved.column(column)));
         let score = score - CommonVector::from_fn(|row, _| solved.column(row).dot(&own_score));
-        let squares = squares - own_score.dot(&own.solve(&own_score));
+        let squares = squares - own_score.dot(&own.solve_vector(&own_score));
         let log_likelihood = -ln_sd - 0.5 * squares - ln_own;
         log_likelihood.is_finite().then_some(Self {
             log_likelihood,
@@ -218,7 +269,7 @@ impl System {
 
     /// The drones' own constants where the common errors are known, and how they answer these (negated), m/s.
     pub(super) fn own(&self) -> (DVector<f64>, DMatrix<f64>) {
-        (self.own.solve(&self.own_score), self.own.solve(&self.own_common))
+        (self.own.solve_vector(&self.own_score), self.own.solve(&self.own_common))
     }
 
     /// Covariance of the constants where the common errors are known, (m/s)².

@@ -15,10 +15,15 @@ mod whiten;
 #[cfg(test)]
 mod tests;
 
+use rayon::prelude::*;
+
 use super::covariance::{Covariance, Form};
 use super::data::{Drone, Row, Rows, UNIFORM};
 use super::neighbours::{Neighbours, Reach, before};
-use super::scales::{Found, LN_GUST, LN_LENGTH, LN_SD, LN_TIME, Point, Search, log_prior};
+use super::scales::{
+    COARSE, Extent, FINE, Found, LN_GUST, LN_LENGTH, LN_SD, LN_TIME, Point, Search, Whole,
+    log_prior,
+};
 use crate::numeric::{differences, minimise};
 use fit::{Candidate, Fit, Region, record};
 use shape::{DRIFT, DRIFT_MPS, PLACE, PLACE_M, SINK, Shape};
@@ -28,9 +33,7 @@ use whiten::Whitening;
 const MOST: usize = 4;
 /// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again. Neighbours
 /// stand for all values, and forms for the field's own: fields without a thermal reach 9 (docs/errors.md).
-const WORTH: f64 = 12.0;
-/// In the scales that were found without it, a thermal must come so near to being worth it, nats, to be followed.
-const WORTH_A_LOOK: f64 = -6.0;
+const WORTH: f64 = 5.0;
 /// Rounds in which scales and thermal are found again.
 const ROUNDS: usize = 3;
 /// A field that may have been taken for a thermal's is tried so much weaker, too (logarithm).
@@ -110,7 +113,7 @@ impl Record<'_> {
         let moves = self.drones.iter().any(|drone| !drone.hovers());
         let reach = if moves { REACH_OF_MOVING } else { REACH };
         let neighbours = before(self.drones, rows, reach);
-        let looked = Looked { search: &search, neighbours: &neighbours };
+        let looked = Looked { search: &search, drones: self.drones, neighbours: &neighbours };
         looked.thermals(&region, (self.found.form, self.found.best))
     }
 }
@@ -118,6 +121,7 @@ impl Record<'_> {
 /// A record with what makes it white.
 struct Looked<'a> {
     search: &'a Search<'a>,
+    drones: &'a [Drone],
     neighbours: &'a Neighbours,
 }
 
@@ -126,7 +130,7 @@ impl Looked<'_> {
         let mut found: Vec<(Candidate, f64)> = Vec::new();
         let mut left = self.search.rows.clone();
         // With the zero better known.
-        let mut scales = again(self.search, scales);
+        let mut scales = self.again(self.search.rows, scales, FINE).0;
         while found.len() < MOST {
             let Some(none) = self.evidence(&left, &scales) else { break };
             let Some(one) = self.one(&left, region, scales) else { break };
@@ -143,6 +147,31 @@ impl Looked<'_> {
             .into_iter()
             .map(|(candidate, log_odds)| thermal(&candidate.at_its_best(region), log_odds))
             .collect()
+    }
+
+    /// The most probable scales of a record in any form, from those of another one.
+    fn in_any_form(&self, rows: &Rows, (form, start): Scales) -> Scales {
+        let mut others: Vec<Form> = Form::ALL.into_iter().filter(|other| *other != form).collect();
+        others.insert(0, form);
+        let roughly: Vec<(Scales, f64)> =
+            others.into_par_iter().map(|form| self.again(rows, (form, start), COARSE)).collect();
+        let best = roughly.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
+        self.again(rows, best.map_or((form, start), |(scales, _)| scales), FINE).0
+    }
+
+    /// The most probable scales of a record, from others, with the logarithm of their posterior.
+    fn again(&self, rows: &Rows, (form, start): Scales, extent: Extent) -> (Scales, f64) {
+        let whole = Whole::of(self.drones, rows, extent);
+        let search = Search { rows, whole: Some(&whole), ..*self.search };
+        let of = |some: &[f64; 4]| {
+            let mut point = start;
+            AGAIN.iter().zip(some).for_each(|(index, value)| point[*index] = *value);
+            point
+        };
+        let loss = |some: &[f64; 4]| -search.log_posterior(form, &of(some));
+        let first = AGAIN.map(|index| start[index]);
+        let (best, least) = minimise(first, loss, |at, value| differences(loss, at, value));
+        ((form, if least.is_finite() { of(&best) } else { start }), -least)
     }
 
     fn whitening(&self, rows: &Rows, (form, point): &Scales) -> Option<Whitening<'_>> {
@@ -165,14 +194,14 @@ impl Looked<'_> {
             let values = whitening.white(&values(rows));
             Fit { rows, region, whitening: &whitening, values }.best()
         };
-        let first = look(&scales)?;
+        let first = look(&scales);
         let mut quiet = scales;
         quiet.1[LN_SD] += QUIET;
         let second = look(&quiet)?;
-        if first.log_odds < WORTH_A_LOOK || second.log_odds < WORTH {
+        if second.log_odds < WORTH {
             return None;
         }
-        let starts = [first, second].into_iter().filter(|start| is_met(rows, start));
+        let starts = first.into_iter().chain([second]).filter(|start| is_met(rows, start));
         starts
             .filter_map(|start| self.refined(rows, region, start, scales))
             .filter(|one| is_met(rows, &one.candidate))
@@ -188,10 +217,12 @@ impl Looked<'_> {
         scales: Scales,
     ) -> Option<Explained> {
         let mut at = Explained { candidate: start, scales, evidence: f64::NEG_INFINITY };
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let left = without(rows, &at.candidate);
-            let search = Search { rows: &left, ..*self.search };
-            let scales = again(&search, at.scales);
+            let scales = match round {
+                0 => self.in_any_form(&left, at.scales),
+                _ => self.again(&left, at.scales, FINE).0,
+            };
             let point = scales.1;
             let whitening = self.whitening(rows, &scales)?;
             let white = whitening.white(&values(rows));
@@ -236,19 +267,6 @@ impl Looked<'_> {
 
 /// Scales that are found again with a thermal: the others hardly hang on it.
 const AGAIN: [usize; 4] = [LN_SD, LN_LENGTH, LN_TIME, LN_GUST];
-
-/// The most probable scales of a record, from those of another one.
-fn again(search: &Search<'_>, (form, start): Scales) -> Scales {
-    let of = |some: &[f64; 4]| {
-        let mut point = start;
-        AGAIN.iter().zip(some).for_each(|(index, value)| point[*index] = *value);
-        point
-    };
-    let loss = |some: &[f64; 4]| -search.log_posterior(form, &of(some));
-    let first = AGAIN.map(|index| start[index]);
-    let (best, least) = minimise(first, loss, |at, value| differences(loss, at, value));
-    (form, if least.is_finite() { of(&best) } else { start })
-}
 
 fn values(rows: &Rows) -> Vec<f64> {
     rows.list.iter().map(|row| row.value_mps).collect()

@@ -10,7 +10,7 @@ use crate::analysis::kriging::covariance::{Air, Covariance, Form};
 use crate::analysis::kriging::data::{Drone, Rows, UNIFORM, Value};
 use crate::analysis::kriging::moving;
 use crate::analysis::kriging::neighbours::{Reach, before};
-use crate::analysis::kriging::scales::Search;
+use crate::analysis::kriging::scales::{COARSE, FINE, Search, Whole};
 use crate::analysis::kriging::vecchia::Common;
 use crate::analysis::shape::PARAMETERS;
 use crate::base::rng::{Purpose, stream};
@@ -183,15 +183,15 @@ fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<
     let moves = drones.iter().any(|drone| !drone.hovers());
     let reach = if moves { moving::REACH } else { Reach { beside: 7, step: 7, own: 2 } };
     let all = before(drones, rows, reach);
-    let some = if moves { moving::thinned(&all) } else { all.clone() };
+    let (fine, coarse) = (Whole::of(drones, rows, FINE), Whole::of(drones, rows, COARSE));
     let own_mps = vec![OWN_MPS; drones.len()];
     let mut factor = Common::zeros();
     factor[(UNIFORM, UNIFORM)] = 3.0;
     let search = Search {
         rows,
-        neighbours: &some,
-        blocks: None,
-        coarse: None,
+        neighbours: &all,
+        whole: Some(&fine),
+        coarse: Some(&coarse),
         own_mps: &own_mps,
         slope_share: 0.0,
         wind_mps,

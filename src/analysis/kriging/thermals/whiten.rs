@@ -1,4 +1,5 @@
-//! Records with the correlation of the air, the drones' constants and the common errors taken out.
+//! Records with the correlation of the air, the drones' constants and the common errors taken out: all values of a short
+//! record at once, each value of a longer one by its neighbours.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -7,10 +8,71 @@ use crate::analysis::kriging::data::{COMMON, Rows};
 use crate::analysis::kriging::neighbours::Neighbours;
 use crate::analysis::kriging::vecchia::{Common, LEAST_OWN_MPS, Weights, weights};
 
+/// Records of more values than this are made white by neighbours. Numerical: the time grows with the third power, and a
+/// record of 25 drones over 300 s has 750.
+const MOST_AT_ONCE: usize = 800;
+
+/// What takes the correlation of the air out of a record.
+enum Uncorrelated<'a> {
+    /// The factor of the covariance of all values.
+    All(DMatrix<f64>),
+    /// The weights of each value's neighbours.
+    Neighbours(&'a Neighbours, Vec<Weights>),
+}
+
+impl<'a> Uncorrelated<'a> {
+    fn new(rows: &Rows, neighbours: &'a Neighbours, covariance: &Covariance) -> Option<Self> {
+        let list = &rows.list;
+        if list.len() > MOST_AT_ONCE {
+            let each = neighbours.patterns.iter();
+            let weights: Option<Vec<Weights>> =
+                each.map(|pattern| weights(pattern, covariance, true)).collect();
+            return Some(Self::Neighbours(neighbours, weights?));
+        }
+        let mut matrix = DMatrix::zeros(list.len(), list.len());
+        for (column, one) in list.iter().enumerate() {
+            for (row, other) in list.iter().enumerate().skip(column) {
+                matrix[(row, column)] = covariance.of(&other.spot, &one.spot);
+            }
+            matrix[(column, column)] += one.noise_mps * one.noise_mps;
+        }
+        Some(Self::All(matrix.cholesky()?.unpack()))
+    }
+
+    /// Logarithm of what records are divided by.
+    fn ln_sd(&self) -> f64 {
+        match self {
+            Self::All(factor) => factor.diagonal().iter().map(|sd| sd.ln()).sum(),
+            Self::Neighbours(neighbours, weights) => {
+                let variance = |pattern: &usize| weights[*pattern].variance;
+                neighbours.of.iter().map(|pattern| 0.5 * variance(pattern).ln()).sum()
+            }
+        }
+    }
+
+    /// Records, each in a column.
+    fn white(&self, mut raw: DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::All(factor) => {
+                factor.solve_lower_triangular_mut(&mut raw);
+                raw
+            }
+            Self::Neighbours(neighbours, weights) => {
+                DMatrix::from_fn(raw.nrows(), raw.ncols(), |index, column| {
+                    let Weights { of, variance } = &weights[neighbours.of[index]];
+                    let near = of.iter().zip(&neighbours.rows[index]);
+                    let expected: f64 =
+                        near.map(|(weight, near)| weight * raw[(*near as usize, column)]).sum();
+                    (raw[(index, column)] - expected) / variance.sqrt()
+                })
+            }
+        }
+    }
+}
+
 /// What makes records of one air white.
 pub(super) struct Whitening<'a> {
-    neighbours: &'a Neighbours,
-    weights: Vec<Weights>,
+    uncorrelated: Uncorrelated<'a>,
     /// Common errors and constants, each of standard deviation 1, in white records: a row for each value.
     nuisance: DMatrix<f64>,
     /// Factor of their information, with the prior.
@@ -43,11 +105,7 @@ impl<'a> Whitening<'a> {
         factor: &Common,
         own_mps: &[f64],
     ) -> Option<Self> {
-        let weights: Vec<Weights> = neighbours
-            .patterns
-            .iter()
-            .map(|pattern| weights(pattern, covariance, true))
-            .collect::<Option<_>>()?;
+        let uncorrelated = Uncorrelated::new(rows, neighbours, covariance)?;
         let columns = COMMON + own_mps.len();
         let mut raw = DMatrix::zeros(rows.list.len(), columns);
         for (index, row) in rows.list.iter().enumerate() {
@@ -58,36 +116,19 @@ impl<'a> Whitening<'a> {
             let Some(drone) = row.spot.drone else { continue };
             raw[(index, COMMON + drone)] = own_mps[drone].max(LEAST_OWN_MPS);
         }
-        let mut nuisance = DMatrix::zeros(rows.list.len(), columns);
-        let mut ln_density = 0.0;
-        for index in 0..rows.list.len() {
-            let Weights { of, variance } = weights.get(neighbours.of[index])?;
-            let inverse = 1.0 / variance.sqrt();
-            ln_density += inverse.ln();
-            for column in 0..columns {
-                let mut value = raw[(index, column)];
-                for (weight, near) in of.iter().zip(&neighbours.rows[index]) {
-                    value -= weight * raw[(*near as usize, column)];
-                }
-                nuisance[(index, column)] = inverse * value;
-            }
-        }
+        let nuisance = uncorrelated.white(raw);
         let information = nuisance.tr_mul(&nuisance) + DMatrix::identity(columns, columns);
         let information = information.cholesky()?;
         let ln_information: f64 =
             information.l_dirty().diagonal().iter().map(|value: &f64| value.ln()).sum();
-        ln_density -= ln_information;
-        Some(Self { neighbours, weights, nuisance, information, ln_density })
+        let ln_density = -uncorrelated.ln_sd() - ln_information;
+        Some(Self { uncorrelated, nuisance, information, ln_density })
     }
 
     /// A record made white.
     pub(super) fn white(&self, record: &[f64]) -> White {
-        let values = DVector::from_fn(record.len(), |index, _| {
-            let Weights { of, variance } = &self.weights[self.neighbours.of[index]];
-            let near = of.iter().zip(&self.neighbours.rows[index]);
-            let expected: f64 = near.map(|(weight, near)| weight * record[*near as usize]).sum();
-            (record[index] - expected) / variance.sqrt()
-        });
+        let raw = DMatrix::from_column_slice(record.len(), 1, record);
+        let values = self.uncorrelated.white(raw).column(0).into_owned();
         let mut explained = self.nuisance.tr_mul(&values);
         self.information.l_dirty().solve_lower_triangular_mut(&mut explained);
         White { values, explained }
