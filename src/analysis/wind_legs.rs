@@ -464,6 +464,10 @@ mod tests {
 
     /// A drone with other drag and lift than its file's.
     fn flown(doubts: [f64; 2]) -> WindLegs {
+        flown_in(doubts, [0.8, -0.5])
+    }
+
+    fn flown_in(doubts: [f64; 2], wind_mps: [f64; 2]) -> WindLegs {
         let forms = forms();
         let doubts = DVector::from_row_slice(&doubts);
         let mut other = forms.clone();
@@ -475,7 +479,7 @@ mod tests {
                 cells.for_each(|(of, more)| *of += by * more);
             }
         }
-        WindLegs::expected(&other, &LEGS, [0.8, -0.5], 2.0)
+        WindLegs::expected(&other, &LEGS, wind_mps, 2.0)
     }
 
     #[test]
@@ -489,6 +493,26 @@ mod tests {
                 assert!(off.abs() < 1.5 * sd.max(0.1), "{place}: {off} of {truth} with {sd}");
             }
         }
+    }
+
+    #[test]
+    fn legs_of_two_flights_share_the_drone_and_not_the_wind() {
+        let forms = forms();
+        for truth in [[-1.5, 1.0], [1.0, -1.2]] {
+            let (calm, windy) = (flown(truth), flown_in(truth, [-4.0, 6.5]));
+            let found = |flown: &[&WindLegs]| posterior(flown, &forms, 26.0);
+            let both = found(&[&calm, &windy]);
+            for (place, truth) in truth.iter().enumerate() {
+                let sd = |belief: &Belief| belief.covariance[(place, place)].sqrt();
+                assert!(sd(&both) < sd(&found(&[&calm])), "{place}");
+                assert!(sd(&both) < sd(&found(&[&windy])), "{place}");
+                let off = both.mean[place] - truth;
+                assert!(off.abs() < 1.5 * sd(&both).max(0.1), "{place}: {off} of {truth}");
+            }
+            let swapped = found(&[&windy, &calm]);
+            assert!((swapped.mean - both.mean).norm() < 1e-3, "in any order");
+        }
+        assert_eq!(posterior(&[], &forms, 26.0), forms.prior());
     }
 
     #[test]
