@@ -10,7 +10,8 @@
 //! fleet flies `scan-campaign`. `truth.csv` has the mean of the true vertical air speed over the 10 s around each second,
 //! along the planned way; `truth-thermal.json` the thermal. A fourth argument is the side of the grid (5), a fifth the
 //! distance of its drones (10 m). Arguments with an equals sign, wherever behind the folder, set values of the campaign's
-//! templates: `'calibration.legs.speeds_mps=[3, 6]'`.
+//! templates: `'calibration.legs.speeds_mps=[3, 6]'`, `'hover.legs.speeds_mps=[3, 6]'`. With `telemetry=true` the logs
+//! have rotor speeds, and currents with errors.
 
 #![expect(clippy::print_stderr, reason = "it says what went wrong")]
 
@@ -22,6 +23,7 @@ use std::path::PathBuf;
 use foreign_worlds::World;
 use foreign_worlds::air::{AirSettings, FieldSettings, Profile, Shear, ThermalSettings};
 use foreign_worlds::hidden::HiddenEffect;
+use foreign_worlds::telemetry::TelemetrySettings;
 use updraft::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use updraft::blind::scenario::{AirClass, Base, Cell, Protocol};
 use updraft::blind::worlds::fly::{Settings, air_of, fly_plan};
@@ -39,6 +41,8 @@ use updraft::workflow::{mission, plan};
 const LOST: f64 = 0.15;
 /// Seconds of a running mean.
 const MEAN_S: usize = 10;
+/// The argument that asks for rotor speeds.
+const TELEMETRY: &str = "telemetry=true";
 /// Steps of the truth within a second.
 const STEPS: usize = 5;
 
@@ -50,7 +54,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         return Ok(());
     };
-    let (more, numbers): (Vec<String>, Vec<String>) = words.partition(|word| word.contains('='));
+    let (mut more, numbers): (Vec<String>, Vec<String>) =
+        words.partition(|word| word.contains('='));
+    let has_telemetry = more.iter().any(|word| word == TELEMETRY);
+    more.retain(|word| word != TELEMETRY);
     let mut numbers = numbers.into_iter();
     let side = numbers.next().map_or(Ok(5), |word| word.parse::<u32>())?;
     let spacing_m = numbers.next().map_or(Ok(10.0), |word| word.parse::<f64>())?;
@@ -84,7 +91,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     // Pulses follow the battery's voltage, as those of all controllers do that do not measure it.
     let voltage = HiddenEffect { kind: "voltage".to_owned(), values: vec![1.0] };
-    let mut drawn = World { hidden: vec![voltage], ..draw::world(seed, &cell)? };
+    let telemetry = has_telemetry.then(telemetry);
+    let mut drawn = World { hidden: vec![voltage], telemetry, ..draw::world(seed, &cell)? };
     if !kind.starts_with("noisy") {
         // Noise of pulses that lasts for seconds cannot be told from gusts of a drone's own: only one kind has it.
         drawn.noise.pulse_coloured_us = 0.0;
@@ -114,6 +122,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
+}
+
+/// Telemetry of controllers that send hundreds of electrical revolutions of motors with seven pairs of poles, and a
+/// current sensor as power modules have them: calibrated to a hundredth. Chosen.
+fn telemetry() -> TelemetrySettings {
+    TelemetrySettings {
+        speed_white_rpm: 15.0,
+        speed_step_rpm: 100.0 / 7.0,
+        current_share: 0.01,
+        current_coloured_share: 0.005,
+        current_coloured_s: 60.0,
+        current_white_a: 0.1,
+        current_step_a: 0.01,
+    }
 }
 
 /// Air of a kind in the first (calibration) or second flight.

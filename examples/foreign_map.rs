@@ -6,7 +6,8 @@
 //! cargo run --release --example foreign_map -- gusty-7 [...]
 //! ```
 //!
-//! A row for each campaign, then means for each kind of air (the folder's name up to its last hyphen).
+//! With `--indicator=rotor-speed` (or `power`) before the folders the maps are of that indicator; with `--combine` the
+//! errors of all three and of their combination follow each row. A row for each campaign, then means for each kind of air (the folder's name up to its last hyphen).
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "it prints its result")]
 
@@ -16,8 +17,10 @@ use std::path::Path;
 
 use updraft::analysis::TruthSeries;
 use updraft::analysis::budget::TruthCheck;
+use updraft::analysis::combine::CombinedMap;
 use updraft::analysis::result::PosteriorMap;
 use updraft::analysis::statistics::result::TrueAir;
+use updraft::flight::Indicator;
 use updraft::workflow::analyze::{Analysing, Settings};
 use updraft::workflow::find::{Work, find};
 use updraft::workflow::host::Quiet;
@@ -25,12 +28,26 @@ use updraft::workflow::host::Quiet;
 fn main() {
     let mut kinds: BTreeMap<String, Vec<Row>> = BTreeMap::new();
     println!("{HEAD}");
-    for folder in std::env::args().skip(1) {
-        let folder = Path::new(&folder);
-        match row(folder) {
-            Ok(row) => {
+    let (options, folders): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|word| word.starts_with("--"));
+    let mut settings = Settings::default();
+    for option in &options {
+        match option.as_str() {
+            "--indicator=rotor-speed" => settings.options.indicator = Indicator::RotorSpeed,
+            "--indicator=power" => settings.options.indicator = Indicator::Power,
+            "--combine" => settings.combine = true,
+            _ => eprintln!("{option} is not known"),
+        }
+    }
+    for folder in &folders {
+        let folder = Path::new(folder);
+        match row(folder, &settings) {
+            Ok((row, combined)) => {
                 let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 println!("{name:18} {}", row.words());
+                if let Some(combined) = combined {
+                    println!("{combined}");
+                }
                 let kind = name.rsplit_once('-').map_or(name.as_str(), |(kind, _)| kind);
                 kinds.entry(kind.to_owned()).or_default().push(row);
             }
@@ -116,7 +133,7 @@ impl Row {
     }
 }
 
-fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
+fn row(folder: &Path, settings: &Settings) -> Result<(Row, Option<String>), Box<dyn Error>> {
     let host = Quiet::default();
     let mut work = Work::new(folder);
     find(folder, None, &mut work)?;
@@ -127,7 +144,7 @@ fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
     let hover = work.flights.last_mut().ok_or("no flight")?;
     hover.truth = truth(&std::fs::read_to_string(folder.join("truth.csv"))?)?;
     hover.true_air.clone_from(&known);
-    let analysed = Analysing::begin(&host, &work, &Settings::default(), None)?.run(false)?;
+    let analysed = Analysing::begin(&host, &work, settings, None)?.run(false)?;
     let map =
         analysed.analysis.flights.last().and_then(|flight| flight.map.as_ref()).ok_or("no map")?;
     let plain = map.truth.unwrap_or_default();
@@ -162,7 +179,8 @@ fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
             interval.zip(value).is_some_and(|([low, high], value)| (low..=high).contains(&value));
         f64::from(u8::from(held))
     };
-    Ok(Row {
+    let combined = map.combined.as_ref().map(combined_words);
+    let row = Row {
         zero: truth.zero_rms_mps,
         plain: plain.rms_mps,
         plain_inside: plain.inside_share,
@@ -188,7 +206,24 @@ fn row(folder: &Path) -> Result<Row, Box<dyn Error>> {
             field.map(|field| field.tau_s),
         ),
         has_scales: f64::from(u8::from(scales.is_some())),
-    })
+    };
+    Ok((row, combined))
+}
+
+/// Errors of each second alone: by each indicator, and by all together.
+fn combined_words(combined: &CombinedMap) -> String {
+    let each: Vec<String> = combined
+        .indicators
+        .iter()
+        .map(|one| {
+            let rms_mps = one.rms_mps.unwrap_or(f64::NAN);
+            format!("{rms_mps:.3} ({:.2}, {:.3})", one.weight, one.residual_mps)
+        })
+        .collect();
+    let (rms_mps, rest_mps) = combined
+        .truth
+        .map_or((f64::NAN, f64::NAN), |truth| (truth.rms_mps, truth.rms_without_bias_mps));
+    format!("    combined {rms_mps:.3} (rest {rest_mps:.3}) of {}", each.join(", "))
 }
 
 /// The table beside a foreign campaign.

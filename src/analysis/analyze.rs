@@ -41,8 +41,9 @@ use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
 use super::wind_forms::{Belief, WindForms};
+use super::wind_legs;
 use crate::flight::Indicator;
-use crate::mission::plan::Purpose;
+use crate::mission::plan::{Group, Purpose};
 
 /// Progress callback, called after each log with (logs done, logs in all).
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
@@ -195,17 +196,23 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
-    let by_forms = input.wind_forms.map(|forms| {
-        let legs = reference.and_then(|reference| reference.wind_legs.as_ref());
-        forms.table(&believed(forms, legs, reference))
-    });
-    let corrections = Corrections {
+    let mut corrections = Corrections {
         density: input.density,
         leaning: input.leaning,
-        lean_table: by_forms.as_ref().or(input.lean_table),
+        lean_table: input.lean_table,
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
     };
+    let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
+    let by_forms = input.wind_forms.map(|forms| {
+        let own = (planned_purpose == Some(Purpose::Measurement))
+            .then(|| own_legs(input, options, corrections, &work))
+            .flatten();
+        let of_reference = reference.and_then(|reference| reference.wind_legs.as_ref());
+        let legs: Vec<&WindLegs> = of_reference.into_iter().chain(&own).collect();
+        forms.table(&believed(forms, &legs, reference))
+    });
+    corrections.lean_table = by_forms.as_ref().or(input.lean_table);
     let aware = reference
         .filter(|_| input.level.is_none())
         .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
@@ -226,15 +233,10 @@ pub fn analyze_flight(
     };
 
     let done = AtomicUsize::new(0);
-    let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
     let outcomes: Vec<Result<One, Cause>> = work
         .par_iter()
         .map(|(log, slot)| {
-            let outcome = match slot {
-                SlotMatch::Refused { reason, .. } => Err(reason.clone()),
-                SlotMatch::Slot(number) => one(&shared, log, Some(*number)),
-                SlotMatch::Unplanned => one(&shared, log, None),
-            };
+            let outcome = one_of(&shared, log, slot);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, input.logs.len());
             outcome
         })
@@ -260,17 +262,50 @@ pub fn analyze_flight(
     Ok(flight)
 }
 
+fn one_of(shared: &Shared<'_>, log: &LogInput, slot: &SlotMatch) -> Result<One, Cause> {
+    match slot {
+        SlotMatch::Refused { reason, .. } => Err(reason.clone()),
+        SlotMatch::Slot(number) => one(shared, log, Some(*number)),
+        SlotMatch::Unplanned => one(shared, log, None),
+    }
+}
+
+/// The legs of a measurement that calibrate the wind, by which its own hovers are corrected: its logs are read for
+/// them first, so that not all of them are in memory at once.
+fn own_legs(
+    input: &FlightInput<'_>,
+    options: &AnalysisOptions,
+    corrections: Corrections<'_>,
+    work: &[(&LogInput, &SlotMatch)],
+) -> Option<WindLegs> {
+    let plan = input.plan?;
+    let calibrates = |group: &Group| group.segments.iter().any(|segment| segment.calibrates_wind);
+    if !plan.groups.iter().any(calibrates) {
+        return None;
+    }
+    let shared = Shared {
+        input,
+        options,
+        reference: None,
+        map_reference: None,
+        planned_purpose: Some(Purpose::Measurement),
+        map_law: None,
+        corrections,
+        aware: None,
+    };
+    let drones: Vec<DroneAnalysis> = work
+        .par_iter()
+        .filter_map(|(log, slot)| Some(one_of(&shared, log, slot).ok()?.drone))
+        .collect();
+    WindLegs::of(plan, &drones)
+}
+
 /// What is believed of drag and lift after the horizontal legs, if any were flown.
-fn believed(
-    forms: &WindForms,
-    legs: Option<&WindLegs>,
-    reference: Option<&FlightAnalysis>,
-) -> Belief {
-    let Some(legs) = legs else { return forms.prior() };
+fn believed(forms: &WindForms, legs: &[&WindLegs], reference: Option<&FlightAnalysis>) -> Belief {
     let slope = reference
         .and_then(|reference| reference.flock.as_ref()?.linear.as_ref()?.parameters.first())
         .map_or(TYPICAL_SLOPE, |slope| slope.estimate.value);
-    legs.posterior(forms, slope)
+    wind_legs::posterior(legs, forms, slope)
 }
 
 /// Unusable logs named in an error.
@@ -327,7 +362,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         table: laws.table,
         map,
         statistics,
-        wind_legs: wind_legs.filter(|_| purpose == Purpose::Calibration),
+        wind_legs,
         unmeasured,
         paper_table: laws.paper,
         warnings,

@@ -100,13 +100,17 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let seen = Seen { flight: &flight, corrected: &corrected, targets: &targets, windows: &stats };
+    let of_air = match slot {
+        Some((_, segments)) if log.table.is_none() => windows::of_air(segments),
+        _ => targets.clone(),
+    };
+    let seen = Seen { flight: &flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
     let updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
         (None, None, _) => None,
         (_, _, Some(reason)) => Some(Err(reason.clone())),
         (Some(level), ..) => {
-            Some(levelled::measure(shared, level, &flight, &targets, (number, &name)))
+            Some(levelled::measure(shared, level, &flight, &of_air, (number, &name)))
         }
         (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
     };
@@ -126,8 +130,8 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         warnings,
     };
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
-    let hover = HoverSeen::of(&flight, &corrected, &targets);
-    let truth = true_air(&flight, &targets);
+    let hover = HoverSeen::of(&flight, &corrected, &of_air);
+    let truth = true_air(&flight, &of_air);
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, truth })
 }
 

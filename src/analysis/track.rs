@@ -256,6 +256,7 @@ mod tests {
             velocity_mps: [speed, 0.0, 0.0],
             from_velocity_mps: None,
             window: None,
+            calibrates_wind: false,
         };
         assert_eq!(contradiction(&flown(), &[leg(25_000, 4.0), leg(45_000, 4.0)]), None);
         let said = contradiction(&flown(), &[leg(0, 4.0), leg(25_000, 1.0)]).unwrap().to_string();

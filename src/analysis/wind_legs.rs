@@ -3,8 +3,10 @@
 //! A leg at a constant speed through calm air leans and lifts a drone as a hover in that wind does. Beside
 //! the hovers around it, each leg gives a lean and a change of the pulse at an air speed that is known but
 //! for the wind of the day, which legs to all sides tell as well. From the prior of the forms
-//! ([`super::wind_forms`]) follows their posterior: Gauss-Newton steps over the doubts and the wind, with
-//! gusts of a share of the wind.
+//! ([`super::wind_forms`]) follows their posterior: Gauss-Newton steps over the doubts and the wind of each
+//! flight with legs, with gusts of a share of the wind. Calibration and measurement may both have legs. The
+//! air that a measurement is flown for is no part of it: a leg's pulse counts beside that of its hovers,
+//! which stand in the same air.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +18,7 @@ use super::result::DroneAnalysis;
 use super::wind_forms::{Belief, WindForms};
 use super::window::WindowStats;
 use crate::mission::Plan;
-use crate::mission::plan::SegmentKind;
+use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric::mean;
 
 /// Hovers that a leg is compared with: not further away in time, s, and in height, m. Chosen: battery and air drift.
@@ -77,14 +79,15 @@ pub struct WindLegs {
 }
 
 impl WindLegs {
-    /// The legs of a flight; `None` with fewer than two.
+    /// The legs of a flight; `None` with fewer than two. Those that a scan is measured along are none.
     pub(super) fn of(plan: &Plan, drones: &[DroneAnalysis]) -> Option<Self> {
         let mut found: BTreeMap<(u64, String), (Vec<Flown>, [f64; 2])> = BTreeMap::new();
         for drone in drones {
             let Some(slot) = drone.slot.and_then(|slot| plan.slot(slot)) else { continue };
             for segment in plan.segments(slot) {
                 let Some(window) = segment.window else { continue };
-                if segment.kind != SegmentKind::Horizontal {
+                let calibrates = plan.purpose == Purpose::Calibration || segment.calibrates_wind;
+                if segment.kind != SegmentKind::Horizontal || !calibrates {
                     continue;
                 }
                 let start_s = window.start_ms as f64 / 1000.0;
@@ -140,12 +143,13 @@ impl WindLegs {
         };
         Self { legs: ground_mps.iter().map(leg).collect(), hover_lean_deg, noise_us }
     }
+}
 
-    /// What the legs leave of a belief about the forms; `slope` is the pulse per vertical speed, us/(m/s).
-    pub(super) fn posterior(&self, forms: &WindForms, slope: f64) -> Belief {
-        let fit = Fit { legs: self, forms, slope };
-        fit.best().unwrap_or_else(|| forms.prior())
-    }
+/// What the legs of some flights leave of a belief about the forms, each with its own wind; `slope` is the pulse
+/// per vertical speed, us/(m/s).
+pub(super) fn posterior(flown: &[&WindLegs], forms: &WindForms, slope: f64) -> Belief {
+    let fit = Fit { flown, forms, slope };
+    (!flown.is_empty()).then(|| fit.best()).flatten().unwrap_or_else(|| forms.prior())
 }
 
 /// Worth of legs: standard errors of a map in a wind, m/s, that was calibrated in a light one.
@@ -157,12 +161,23 @@ pub struct Bought {
     pub with_mps: f64,
 }
 
-/// Worth of legs over ground at these velocities (show frame, m/s), flown in a light wind, in a strong one.
-pub fn bought(forms: &WindForms, ground_mps: &[[f64; 2]], wind_mps: f64) -> Bought {
-    let legs = WindLegs::expected(forms, ground_mps, [EXPECTED_WIND_MPS, 0.0], EXPECTED_NOISE_US);
+/// Worth of legs over ground at these velocities (show frame, m/s) for a map in this wind, m/s: legs of a calibration
+/// are flown in a light one, those of the measurement in the wind of the map.
+pub fn bought(
+    forms: &WindForms,
+    ground_mps: &[[f64; 2]],
+    purpose: Purpose,
+    wind_mps: f64,
+) -> Bought {
+    let flown_in_mps = match purpose {
+        Purpose::Calibration => EXPECTED_WIND_MPS,
+        Purpose::Measurement => wind_mps,
+    };
+    let legs = WindLegs::expected(forms, ground_mps, [flown_in_mps, 0.0], EXPECTED_NOISE_US);
     let error = |belief: &Belief| forms.error_mps(belief, EXPECTED_WIND_MPS, wind_mps);
     // No level needs a slope where nothing climbs.
-    Bought { without_mps: error(&forms.prior()), with_mps: error(&legs.posterior(forms, 0.0)) }
+    let with = posterior(&[&legs], forms, 0.0);
+    Bought { without_mps: error(&forms.prior()), with_mps: error(&with) }
 }
 
 /// One drone on one leg.
@@ -230,9 +245,9 @@ fn noise_us(drones: &[DroneAnalysis]) -> f64 {
     mean(squares).unwrap_or_default().sqrt().max(LEAST_NOISE_US)
 }
 
-/// The search: doubts of the forms, then the wind along show x and y.
+/// The search: doubts of the forms, then for each flight its wind along show x and y.
 struct Fit<'a> {
-    legs: &'a WindLegs,
+    flown: &'a [&'a WindLegs],
     forms: &'a WindForms,
     slope: f64,
 }
@@ -245,11 +260,16 @@ impl Fit<'_> {
         self.forms.doubts.len()
     }
 
-    /// What a point leaves of the hovers' lean (with no pulse) and of each leg.
-    fn left(&self, at: &DVector<f64>) -> Vec<Left> {
+    fn size(&self) -> usize {
+        self.doubts() + 2 * self.flown.len()
+    }
+
+    /// What a point leaves of a flight: of the hovers' lean (with no pulse), and of each leg.
+    fn left(&self, flight: usize, at: &DVector<f64>) -> Vec<Left> {
         let n = self.doubts();
+        let legs = self.flown[flight];
         let doubts = at.rows(0, n).into_owned();
-        let (x, y) = (at[n], at[n + 1]);
+        let (x, y) = (at[n + 2 * flight], at[n + 2 * flight + 1]);
         let level = |air_mps: f64| Vector2::from(self.forms.level(&doubts, air_mps));
         let gust_mps = (GUST_SHARE * x.hypot(y)).max(LEAST_GUST_MPS);
         let slope_at = |air_mps: f64| {
@@ -259,16 +279,16 @@ impl Fit<'_> {
         let hover_mps = x.hypot(y);
         let hover = level(hover_mps);
         // The air of a leg and that of the hovers around it.
-        let pulse_us = self.legs.noise_us.max(LEAST_NOISE_US) * 1.5_f64.sqrt();
+        let pulse_us = legs.noise_us.max(LEAST_NOISE_US) * 1.5_f64.sqrt();
         let noise = |air_mps: f64| {
             let by_gust = slope_at(air_mps) * gust_mps;
             Matrix2::new(LEAN_RAD * LEAN_RAD, 0.0, 0.0, pulse_us * pulse_us)
                 + by_gust * by_gust.transpose()
         };
         let tangent = |lean_deg: f64| lean_deg.to_radians().tan();
-        let of_hover = Vector2::new(tangent(self.legs.hover_lean_deg) - hover.x, 0.0);
+        let of_hover = Vector2::new(tangent(legs.hover_lean_deg) - hover.x, 0.0);
         let mut found = vec![(of_hover, noise(hover_mps))];
-        for leg in &self.legs.legs {
+        for leg in &legs.legs {
             let [vx, vy] = leg.ground_mps;
             let air_mps = (vx - x).hypot(vy - y);
             let wanted = level(air_mps);
@@ -280,34 +300,41 @@ impl Fit<'_> {
         found
     }
 
-    /// Minus the logarithm of the posterior density, without its constant, and the misfit of the legs alone.
-    fn cost(&self, at: &DVector<f64>) -> (f64, f64) {
+    /// Minus the logarithm of a flight's likelihood, without its constant, and its misfit.
+    fn cost_of(&self, flight: usize, at: &DVector<f64>) -> (f64, f64) {
         let (mut cost, mut misfit) = (0.0, 0.0);
-        for (left, noise) in self.left(at) {
+        for (left, noise) in self.left(flight, at) {
             let Some(inverse) = noise.try_inverse() else { return (f64::INFINITY, f64::INFINITY) };
             let chi2 = left.dot(&(inverse * left));
             misfit += chi2;
             cost += 0.5 * (chi2 + noise.determinant().ln());
         }
-        for (place, value) in at.iter().enumerate() {
-            cost += 0.5 * (value / self.prior_sd(place)).powi(2);
-        }
         (cost, misfit)
+    }
+
+    /// Minus the logarithm of the posterior density, without its constant.
+    fn cost(&self, at: &DVector<f64>) -> f64 {
+        let legs: f64 = (0..self.flown.len()).map(|flight| self.cost_of(flight, at).0).sum();
+        let prior = at
+            .iter()
+            .enumerate()
+            .map(|(place, value)| 0.5 * (value / self.prior_sd(place)).powi(2));
+        legs + prior.sum::<f64>()
     }
 
     fn prior_sd(&self, place: usize) -> f64 {
         if place < self.doubts() { 1.0 } else { WIND_MPS }
     }
 
-    /// Normal matrix of the legs and gradient of the cost by what is left.
-    fn normal(&self, at: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    /// Normal matrix of a flight's legs and gradient of the cost by what is left.
+    fn normal(&self, flight: usize, at: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let p = at.len();
-        let here = self.left(at);
+        let here = self.left(flight, at);
         let columns: Vec<Vec<Vector2<f64>>> = (0..p)
             .map(|place| {
                 let mut beside = at.clone();
                 beside[place] += STEP;
-                let there = self.left(&beside);
+                let there = self.left(flight, &beside);
                 here.iter().zip(there).map(|(here, there)| (there.0 - here.0) / STEP).collect()
             })
             .collect();
@@ -326,10 +353,16 @@ impl Fit<'_> {
     }
 
     fn descend(&self, start: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
-        let (mut at, mut cost) = (start.clone(), self.cost(start).0);
+        let (mut at, mut cost) = (start.clone(), self.cost(start));
         let mut damping = 1e-3;
         for _ in 0..STEPS {
-            let (mut normal, mut right) = self.normal(&at)?;
+            let (mut normal, mut right) =
+                (DMatrix::zeros(at.len(), at.len()), DVector::zeros(at.len()));
+            for flight in 0..self.flown.len() {
+                let of_flight = self.normal(flight, &at)?;
+                normal += of_flight.0;
+                right += of_flight.1;
+            }
             for place in 0..at.len() {
                 let known = self.prior_sd(place).powi(-2);
                 normal[(place, place)] += known;
@@ -342,7 +375,7 @@ impl Fit<'_> {
                     damped[(place, place)] *= 1.0 + damping;
                 }
                 let tried = &at - damped.cholesky()?.solve(&right);
-                let there = self.cost(&tried).0;
+                let there = self.cost(&tried);
                 if there < cost {
                     gained = cost - there;
                     (at, cost) = (tried, there);
@@ -358,24 +391,49 @@ impl Fit<'_> {
         Some((at, cost))
     }
 
-    fn best(&self) -> Option<Belief> {
-        let n = self.doubts();
-        let mut starts: Vec<(f64, DVector<f64>)> = Vec::new();
+    /// Winds of a flight from which the search starts.
+    fn winds(&self, flight: usize) -> Vec<[f64; 2]> {
+        let place = self.doubts() + 2 * flight;
+        let mut starts: Vec<(f64, [f64; 2])> = Vec::new();
         for speed_mps in STARTS_MPS {
             for to in 0..STARTS_TO {
                 let angle = to as f64 / STARTS_TO as f64 * std::f64::consts::TAU;
-                let mut start = DVector::zeros(n + 2);
-                (start[n], start[n + 1]) = (speed_mps * angle.cos(), speed_mps * angle.sin());
-                starts.push((self.cost(&start).0, start));
+                let wind_mps = [speed_mps * angle.cos(), speed_mps * angle.sin()];
+                let mut start = DVector::zeros(self.size());
+                (start[place], start[place + 1]) = (wind_mps[0], wind_mps[1]);
+                let prior = 0.5 * (speed_mps / WIND_MPS).powi(2);
+                starts.push((self.cost_of(flight, &start).0 + prior, wind_mps));
             }
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let ends = starts.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.descend(&start));
+        starts.into_iter().take(FOLLOWED).map(|(_, wind_mps)| wind_mps).collect()
+    }
+
+    fn best(&self) -> Option<Belief> {
+        let n = self.doubts();
+        let mut starts = vec![DVector::zeros(self.size())];
+        for flight in 0..self.flown.len() {
+            let place = n + 2 * flight;
+            let winds = self.winds(flight);
+            let with = |start: &DVector<f64>, wind_mps: &[f64; 2]| {
+                let mut start = start.clone();
+                (start[place], start[place + 1]) = (wind_mps[0], wind_mps[1]);
+                start
+            };
+            starts = starts
+                .iter()
+                .flat_map(|start| winds.iter().map(move |wind_mps| with(start, wind_mps)))
+                .collect();
+        }
+        let ends = starts.iter().filter_map(|start| self.descend(start));
         let (at, _) = ends.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        // Legs that scatter by more than they should tell less.
-        let free = (2 * self.legs.legs.len() + 1).saturating_sub(2).max(1) as f64;
-        let worse = (self.cost(&at).1 / free).max(1.0);
-        let mut normal = self.normal(&at)?.0 / worse;
+        let mut normal = DMatrix::zeros(at.len(), at.len());
+        for (flight, legs) in self.flown.iter().enumerate() {
+            // Legs that scatter by more than they should tell less.
+            let free = (2 * legs.legs.len() + 1).saturating_sub(2).max(1) as f64;
+            let worse = (self.cost_of(flight, &at).1 / free).max(1.0);
+            normal += self.normal(flight, &at)?.0 / worse;
+        }
         for place in 0..at.len() {
             normal[(place, place)] += self.prior_sd(place).powi(-2);
         }
@@ -406,6 +464,10 @@ mod tests {
 
     /// A drone with other drag and lift than its file's.
     fn flown(doubts: [f64; 2]) -> WindLegs {
+        flown_in(doubts, [0.8, -0.5])
+    }
+
+    fn flown_in(doubts: [f64; 2], wind_mps: [f64; 2]) -> WindLegs {
         let forms = forms();
         let doubts = DVector::from_row_slice(&doubts);
         let mut other = forms.clone();
@@ -417,13 +479,13 @@ mod tests {
                 cells.for_each(|(of, more)| *of += by * more);
             }
         }
-        WindLegs::expected(&other, &LEGS, [0.8, -0.5], 2.0)
+        WindLegs::expected(&other, &LEGS, wind_mps, 2.0)
     }
 
     #[test]
     fn legs_tell_drag_and_lift_and_the_wind_besides() {
         for truth in [[0.0, 0.0], [-1.5, 1.0], [1.0, -1.2]] {
-            let belief = flown(truth).posterior(&forms(), 26.0);
+            let belief = posterior(&[&flown(truth)], &forms(), 26.0);
             for (place, truth) in truth.iter().enumerate() {
                 let sd = belief.covariance[(place, place)].sqrt();
                 assert!(sd < 0.6, "{sd}");
@@ -434,25 +496,45 @@ mod tests {
     }
 
     #[test]
+    fn legs_of_two_flights_share_the_drone_and_not_the_wind() {
+        let forms = forms();
+        for truth in [[-1.5, 1.0], [1.0, -1.2]] {
+            let (calm, windy) = (flown(truth), flown_in(truth, [-4.0, 6.5]));
+            let found = |flown: &[&WindLegs]| posterior(flown, &forms, 26.0);
+            let both = found(&[&calm, &windy]);
+            for (place, truth) in truth.iter().enumerate() {
+                let sd = |belief: &Belief| belief.covariance[(place, place)].sqrt();
+                assert!(sd(&both) < sd(&found(&[&calm])), "{place}");
+                assert!(sd(&both) < sd(&found(&[&windy])), "{place}");
+                let off = both.mean[place] - truth;
+                assert!(off.abs() < 1.5 * sd(&both).max(0.1), "{place}: {off} of {truth}");
+            }
+            let swapped = found(&[&windy, &calm]);
+            assert!((swapped.mean - both.mean).norm() < 1e-3, "in any order");
+        }
+        assert_eq!(posterior(&[], &forms, 26.0), forms.prior());
+    }
+
+    #[test]
     fn legs_that_scatter_tell_less() {
         let mut scattered = flown([0.0, 0.0]);
-        let sure = scattered.posterior(&forms(), 26.0).covariance.trace();
+        let sure = posterior(&[&scattered], &forms(), 26.0).covariance.trace();
         for (index, leg) in scattered.legs.iter_mut().enumerate() {
             leg.change_us += if index % 3 == 0 { 20.0 } else { -10.0 };
         }
-        let unsure = scattered.posterior(&forms(), 26.0).covariance.trace();
+        let unsure = posterior(&[&scattered], &forms(), 26.0).covariance.trace();
         assert!(unsure > 1.5 * sure, "{unsure} {sure}");
     }
 
     #[test]
     fn a_climb_on_a_leg_is_no_lift() {
         let mut climbing = flown([0.0, 1.0]);
-        let wanted = climbing.posterior(&forms(), 26.0).mean;
+        let wanted = posterior(&[&climbing], &forms(), 26.0).mean;
         for leg in &mut climbing.legs {
             leg.climb_mps += 0.1;
             leg.change_us += 2.6;
         }
-        let found = climbing.posterior(&forms(), 26.0).mean;
+        let found = posterior(&[&climbing], &forms(), 26.0).mean;
         assert!((found - wanted).norm() < 1e-6);
     }
 }

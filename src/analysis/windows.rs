@@ -153,6 +153,14 @@ pub fn planned(segments: &[Segment]) -> Vec<Target> {
     segments.iter().filter(analysed).filter_map(target).collect()
 }
 
+/// Those of a plan's windows that a map of the air is made of: legs that calibrate the wind, and the hovers between
+/// them, are none.
+pub(super) fn of_air(segments: &[Segment]) -> Vec<Target> {
+    let segments: Vec<Segment> =
+        segments.iter().filter(|segment| !segment.calibrates_wind).cloned().collect();
+    planned(&segments)
+}
+
 /// Windows from the log's own desired velocity: wherever it is constant for 8 s or more.
 ///
 /// Horizontal legs are told from hovers where the log has horizontal commands. Legs much shorter

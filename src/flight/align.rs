@@ -311,6 +311,7 @@ mod tests {
                 velocity_mps: [0.0, 0.0, *up_mps],
                 from_velocity_mps: None,
                 window: Some(Window { start_ms: start_ms + 10_000, end_ms: start_ms + 19_000 }),
+                calibrates_wind: false,
             }
         };
         (0..).step_by(20_000).zip(speeds_mps).map(leg).collect()

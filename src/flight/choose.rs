@@ -184,6 +184,7 @@ mod tests {
             velocity_mps: [0.0, 0.0, up_mps],
             from_velocity_mps: None,
             window: None,
+            calibrates_wind: false,
         };
         let plan = [segment(0, 20_000, 1.0), segment(20_000, 40_000, 0.2)];
         let difference = |up_mps: fn(f64) -> f64| {

@@ -183,6 +183,7 @@ mod tests {
             velocity_mps: [0.0, 0.0, up_mps(leg)],
             from_velocity_mps: None,
             window: None,
+            calibrates_wind: false,
         };
         let segments: Vec<Segment> = (0..8).map(segment).collect();
         let mut flight = Flight::default();

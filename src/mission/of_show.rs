@@ -145,6 +145,7 @@ fn group(index: usize, trajectory: &Trajectory, curved: &mut bool) -> Group {
             velocity_mps: stretch.velocity_mps.into(),
             from_velocity_mps: stretch.from_velocity_mps.map(Into::into),
             window: rule.of(kind, stretch.start_ms, stretch.end_ms),
+            calibrates_wind: false,
         })
         .collect();
     let offset_ms = match segments.first() {

@@ -154,6 +154,10 @@ pub struct Segment {
     /// Where the analysis looks; absent: not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
+    /// Flown to calibrate what wind does to the vehicle (`[legs]` of a template), with the hovers between: no map of
+    /// the air is made of it. Absent: it is not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub calibrates_wind: bool,
 }
 
 /// Kind of a segment.

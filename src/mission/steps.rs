@@ -116,8 +116,10 @@ impl<'a> Timeline<'a> {
             speed,
             span_of(&takeoff.altitude_m),
         )?;
-        timeline.steps(&template.steps, None, 0)?;
+        let (before, behind) = template.steps.split_at(timeline.steps_before_legs());
+        timeline.steps(before, None, 0)?;
         timeline.legs()?;
+        timeline.steps(behind, None, 0)?;
         timeline.land()?;
         Ok(timeline.segments)
     }
@@ -205,15 +207,28 @@ impl<'a> Timeline<'a> {
         self.timed(SegmentKind::Horizontal, &label, velocity, duration_ms, span)
     }
 
+    /// Steps before the legs that calibrate what wind does: all of a calibration; of a measurement those up to its
+    /// last hover, whose height and wind the legs are flown in.
+    fn steps_before_legs(&self) -> usize {
+        let steps = &self.source.template.steps;
+        let is_hover =
+            |step: &Spanned<StepTemplate>| *step.get_ref().kind.get_ref() == StepKind::Hover;
+        let last_hover = steps.iter().rposition(is_hover);
+        last_hover
+            .filter(|_| self.source.template.purpose == Purpose::Measurement)
+            .map_or(steps.len(), |last| last + 1)
+    }
+
     /// The horizontal legs that calibrate what wind does.
     fn legs(&mut self) -> Result<(), TemplateError> {
         let source = self.source;
         let Some(spanned) = &source.template.legs else { return Ok(()) };
         let (legs, span) = (spanned.get_ref(), span_of(spanned));
+        let first = self.segments.len();
+        let usual_window = self.window;
         if source.template.purpose == Purpose::Measurement {
-            return Err(source
-                .error(span, "[legs] belong to a calibration")
-                .with_help("a measurement is measured along its horizontal steps"));
+            // A hover waits for the end of its climb, and a scan uses its legs whole.
+            self.window = WindowRule::default();
         }
         let speeds_mps =
             source.numbers(&legs.speeds_mps, "speed", "m/s", &(0.01..=MAX_SPEED_MPS))?;
@@ -237,7 +252,8 @@ impl<'a> Timeline<'a> {
                 self.timed(SegmentKind::Hover, &label, Vector3::zeros(), hover_ms, span.clone())?;
             }
         }
-        self.ramp_mps2 = usual_mps2;
+        (self.ramp_mps2, self.window) = (usual_mps2, usual_window);
+        self.segments.iter_mut().skip(first).for_each(|segment| segment.calibrates_wind = true);
         Ok(())
     }
 
@@ -545,6 +561,7 @@ impl<'a> Timeline<'a> {
             velocity_mps: tidy(velocity_mps),
             from_velocity_mps: from_velocity_mps.map(tidy),
             window: self.window.of(kind, start_ms, end_ms),
+            calibrates_wind: false,
         });
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The grammar: what templates mean, and what they are told when they are wrong.
 
-use super::plan::{Plan, SegmentKind};
+use super::plan::{Plan, Segment, SegmentKind};
 use super::resolve::{MissionError, Override, resolve, resolve_text};
 
 fn set(text: &str) -> Override {
@@ -81,7 +81,7 @@ fn counterphase_halves_move_in_opposite_directions() {
     let plan = plan_of("calibration-counterphase", &[]);
     let [even, odd] = &plan.groups[..] else { panic!("two groups") };
     assert_eq!(plan.slots.iter().filter(|slot| slot.group == 0).count(), 25);
-    let moving_at = |segments: &[super::plan::Segment], ms: u64| {
+    let moving_at = |segments: &[Segment], ms: u64| {
         segments
             .iter()
             .find(|s| s.start_ms <= ms && ms < s.end_ms)
@@ -95,7 +95,7 @@ fn counterphase_halves_move_in_opposite_directions() {
         opposite += usize::from(other * leg.velocity_mps[2] < 0.0);
     }
     assert!(opposite >= 13, "only {opposite} of 16 legs are in counter-phase");
-    let horizontal = |segments: &[super::plan::Segment]| {
+    let horizontal = |segments: &[Segment]| {
         let legs = segments.iter().filter(|s| s.kind == SegmentKind::Horizontal);
         legs.map(|s| (s.start_ms, s.velocity_mps)).collect::<Vec<_>>()
     };
@@ -233,6 +233,26 @@ fn legs_behind_a_ladder_go_to_all_sides_and_back() {
     let plain = plan_of("calibration", &["vehicle=pixel", "grid.rows=2"]).groups.remove(0).segments;
     let before = plain.len() - 1;
     assert_eq!(segments[..before], plain[..before], "the ladder is as it was");
-    let refused = resolve("hover", &[set("legs.speeds_mps=[3]")]).unwrap_err().to_string();
-    assert!(refused.contains("[legs] belong to a calibration"), "{refused}");
+}
+
+#[test]
+fn legs_of_a_hover_are_flown_behind_it_at_its_height() {
+    let plain = plan_of("hover", &["vehicle=pixel", "grid.rows=2"]).groups.remove(0).segments;
+    let with = ["vehicle=pixel", "grid.rows=2", "legs.speeds_mps=[3, 6]"];
+    let segments = plan_of("hover", &with).groups.remove(0).segments;
+    let hover = plain.iter().position(|s| s.kind == SegmentKind::Hover).unwrap();
+    assert_eq!(segments[..=hover], plain[..=hover], "the hover is as it was");
+    let (legs, rest): (Vec<&Segment>, Vec<&Segment>) =
+        segments.iter().partition(|segment| segment.calibrates_wind);
+    assert_eq!(rest.len(), plain.len(), "and so is the way down");
+    let flown = |kind| legs.iter().filter(move |segment| segment.kind == kind);
+    assert_eq!(flown(SegmentKind::Horizontal).count(), 8);
+    assert_eq!(flown(SegmentKind::Hover).count(), 9);
+    // A hover's own window waits for 10 s, which is most of a leg.
+    for kind in [SegmentKind::Horizontal, SegmentKind::Hover] {
+        assert!(flown(kind).all(|s| s.window.is_some_and(|window| window.duration_s() >= 4.0)));
+    }
+    assert!(legs.iter().all(|segment| segment.from_m[2] == 100.0));
+    let json = serde_json::to_string(&plain).unwrap();
+    assert!(!json.contains("calibrates_wind"), "other plans keep their bytes");
 }

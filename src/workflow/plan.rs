@@ -96,29 +96,34 @@ const TOLD_WINDS_MPS: [f64; 2] = [5.0, 8.0];
 /// Standard errors in half of a 95 % interval.
 const NORMAL: f64 = 1.96;
 
-/// Sentence on what the horizontal legs of a calibration buy in wind; `None` without legs, and for vehicles
-/// whose lean tells no wind.
+/// Sentence on what the horizontal legs that calibrate the wind buy; `None` without such legs, and for vehicles whose
+/// lean tells no wind.
 pub fn legs_buy(plan: &Plan, vehicle: &Vehicle) -> Option<String> {
     let legs = plan
         .groups
         .first()?
         .segments
         .iter()
-        .filter(|segment| segment.kind == SegmentKind::Horizontal && segment.window.is_some());
+        .filter(|segment| segment.kind == SegmentKind::Horizontal && segment.window.is_some())
+        .filter(|segment| plan.purpose == Purpose::Calibration || segment.calibrates_wind);
     let ground_mps: Vec<[f64; 2]> =
         legs.map(|leg| [leg.velocity_mps[0], leg.velocity_mps[1]]).collect();
-    if ground_mps.len() < 2 || plan.purpose != Purpose::Calibration {
+    if ground_mps.len() < 2 {
         return None;
     }
     let forms = wind_forms(plan.site.ground_amsl_m, vehicle)?;
     let told = TOLD_WINDS_MPS.map(|wind_mps| {
-        let Bought { without_mps, with_mps } = bought(&forms, &ground_mps, wind_mps);
+        let Bought { without_mps, with_mps } = bought(&forms, &ground_mps, plan.purpose, wind_mps);
         let (without, with) = (NORMAL * without_mps, NORMAL * with_mps);
         format!("+-{with:.2} instead of +-{without:.2} m/s in {wind_mps} m/s of wind")
     });
+    let (flown, map) = match plan.purpose {
+        Purpose::Calibration => ("flown in light wind", "a later map"),
+        Purpose::Measurement => ("beside a calibration in light wind", "this map"),
+    };
     Some(format!(
-        "The {} horizontal legs calibrate lean and lift: flown in light wind, what is unknown of them moves a \
-         later map by {} (95 %, common to all drones)",
+        "The {} horizontal legs calibrate lean and lift: {flown}, what is unknown of them moves {map} by {} \
+         (95 %, common to all drones)",
         ground_mps.len(),
         told.join(", ")
     ))

@@ -228,6 +228,7 @@ pub fn fly<W: Write>(world: &World, air: &Air, drone: &Drone<'_>, out: W) -> io:
             command: decision.command,
             up,
             wanted_up: decision.up,
+            rotor_radps: world.plant.rotor_radps(state),
             battery: &battery,
         };
         record.row(step, STEP_S, &row)?;

@@ -9,6 +9,7 @@ pub mod noise;
 pub mod plant;
 pub mod random;
 mod record;
+pub mod telemetry;
 pub mod trim;
 pub mod vector;
 pub mod world;

@@ -21,6 +21,8 @@ pub enum Purpose {
     Sensors = 106,
     /// Clock of one drone.
     Clock = 107,
+    /// Errors of the motors' controllers and of the current.
+    Telemetry = 108,
 }
 
 /// Random stream of a seed, a drone (0: all of them) and a purpose.

@@ -10,6 +10,7 @@ use crate::battery::Battery;
 use crate::flight::Drone;
 use crate::noise::NoiseSettings;
 use crate::random::{Coloured, Purpose, normal, stream};
+use crate::telemetry::{ROTORS, Telemetry};
 use crate::trim::{FULL_US, IDLE_US};
 use crate::vector::Vector;
 use crate::world::World;
@@ -46,6 +47,8 @@ pub(crate) struct Row<'a> {
     /// Direction of the thrust.
     pub(crate) up: Vector,
     pub(crate) wanted_up: Vector,
+    /// Mean speed of the rotors, where the plant has one.
+    pub(crate) rotor_radps: Option<f64>,
     pub(crate) battery: &'a Battery,
 }
 
@@ -55,6 +58,7 @@ pub(crate) struct Record<W: Write> {
     noise: NoiseSettings,
     pulse_noise: Coloured,
     white: rand_pcg::Pcg64,
+    telemetry: Option<Telemetry>,
     /// Board time less show time, s.
     boot_s: f64,
     /// Show clock of the drone less the true one, s.
@@ -84,7 +88,7 @@ impl<W: Write> Record<W> {
         let (sin, cos) = drone.site.orientation_deg.to_radians().sin_cos();
         let step_s = 1.0 / noise.rate_hz;
         let rng = |part: u64| stream(world.seed ^ (part << 40), drone.slot, Purpose::Pulses);
-        let messages = [
+        let mut messages = vec![
             &catalog::VER,
             &catalog::MSG,
             &catalog::PARM,
@@ -100,6 +104,9 @@ impl<W: Write> Record<W> {
             &catalog::BAT,
             &catalog::GPS,
         ];
+        if world.telemetry.is_some() {
+            messages.push(&catalog::ESC);
+        }
         let [north, east, _] = ned(drone.home_m, (sin, cos));
         let home_deg = (
             drone.site.lat_deg + north / M_PER_DEG,
@@ -115,6 +122,9 @@ impl<W: Write> Record<W> {
                 rng(0),
             ),
             white: rng(1),
+            telemetry: world
+                .telemetry
+                .map(|settings| Telemetry::new(settings, world.seed, drone.slot, step_s)),
             boot_s,
             clock_s,
             level_deg,
@@ -271,6 +281,10 @@ impl<W: Write> Record<W> {
 
     fn battery(&mut self, row: &Row<'_>, board_us: i64) -> io::Result<()> {
         let battery = row.battery;
+        let current_a = match &mut self.telemetry {
+            Some(telemetry) => telemetry.current_a(battery.current_a),
+            None => battery.current_a,
+        };
         self.log.row(
             &catalog::BAT,
             &[
@@ -278,14 +292,24 @@ impl<W: Write> Record<W> {
                 I(0),
                 F(battery.volts()),
                 F(battery.resting_v()),
-                F(battery.current_a),
+                F(current_a),
                 F(battery.used_ah * 1000.0),
                 F(battery.used_wh),
                 F(25.0),
                 F(battery.resistance_ohm()),
                 I((battery.charge() * 100.0) as i64),
             ],
-        )
+        )?;
+        let Some((telemetry, radps)) = self.telemetry.as_mut().zip(row.rotor_radps) else {
+            return Ok(());
+        };
+        let (volts, amps, none) = (F(battery.volts()), F(current_a / ROTORS as f64), F(0.0));
+        for (instance, rpm) in (0..).zip(telemetry.speeds_rpm(radps)) {
+            let rpm = F(rpm);
+            let values = [I(board_us), I(instance), rpm, rpm, volts, amps, none, none, none, none];
+            self.log.row(&catalog::ESC, &values)?;
+        }
+        Ok(())
     }
 
     fn fix(&mut self, row: &Row<'_>, board_us: i64) -> io::Result<()> {

@@ -8,6 +8,7 @@ use crate::battery::BatterySettings;
 use crate::hidden::{Acting, HiddenEffect};
 use crate::noise::NoiseSettings;
 use crate::plant::Plant;
+use crate::telemetry::TelemetrySettings;
 
 /// A world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,6 +28,9 @@ pub struct World {
     pub noise: NoiseSettings,
     /// Hidden effects.
     pub hidden: Vec<HiddenEffect>,
+    /// Telemetry of the motors' controllers. Absent: logs have none, and the battery's current without errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub telemetry: Option<TelemetrySettings>,
 }
 
 impl World {

@@ -62,7 +62,7 @@ pub fn world(seed: u64, cell: &Cell) -> Result<World, BlindError> {
         hidden.push(effect(seed, cell, name)?);
     }
     let thrust_spread = between(rng, (0.012, 0.02));
-    Ok(World { seed, plant, thrust_spread, air, battery, noise, hidden })
+    Ok(World { seed, plant, thrust_spread, air, battery, noise, hidden, telemetry: None })
 }
 
 fn plant(seed: u64, base: Base) -> Result<Plant, BlindError> {

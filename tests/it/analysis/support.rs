@@ -57,6 +57,7 @@ impl Timetable {
             velocity_mps: [0.0, 0.0, up_mps],
             from_velocity_mps: None,
             window,
+            calibrates_wind: false,
         });
         self
     }

@@ -21,7 +21,7 @@ fn updraft(arguments: &[&str], folder: &Path) -> Output {
         .unwrap()
 }
 
-fn run(arguments: &str, folder: &Path) {
+pub(super) fn run(arguments: &str, folder: &Path) {
     let output = updraft(&arguments.split_whitespace().collect::<Vec<_>>(), folder);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

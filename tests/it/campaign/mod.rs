@@ -1,3 +1,4 @@
 //! Campaigns of several flights.
 
 mod air;
+mod legs;

@@ -96,6 +96,14 @@ impl Plant {
         }
     }
 
+    /// Speed of the rotors at a state, rad/s; a thrust law has none.
+    pub fn rotor_radps(&self, state: f64) -> Option<f64> {
+        match self {
+            Self::ThrustLaw(_) => None,
+            Self::BladeElement(_) => Some(state),
+        }
+    }
+
     /// Electrical power at a state of the rotors, W.
     pub fn power_w(&self, state: f64, flow: &Flow) -> f64 {
         match self {

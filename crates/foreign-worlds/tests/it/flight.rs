@@ -2,7 +2,8 @@
 
 use dataflash::{Log, Select};
 use foreign_worlds::plant::{GRAVITY, Plant, density_ratio};
-use foreign_worlds::{Condition, Trim};
+use foreign_worlds::telemetry::TelemetrySettings;
+use foreign_worlds::{Condition, Trim, World};
 
 use super::support::{BLADES, LAW, flown, hiding, ladder, quiet};
 
@@ -13,7 +14,7 @@ fn mean(bytes: &[u8], message: &str, field: &str, (from_s, to_s): (f64, f64)) ->
         Select { message: "SHOW", fields: &["TimeUS", "ClockMS"] },
         Select {
             message,
-            fields: &["TimeUS", "C1", "C2", "C3", "C4", "VD", "PD", "Pitch", "Roll"],
+            fields: &["TimeUS", "C1", "C2", "C3", "C4", "VD", "PD", "Pitch", "Roll", "RPM", "Curr"],
         },
     ];
     let (tables, damage) = log.select(&select);
@@ -40,6 +41,40 @@ fn mean(bytes: &[u8], message: &str, field: &str, (from_s, to_s): (f64, f64)) ->
     }
     assert!(count > 20.0, "{count} rows");
     sum / count
+}
+
+#[test]
+fn telemetry_has_the_rotors_speed_and_changes_nothing_else() {
+    let telemetry = TelemetrySettings {
+        speed_white_rpm: 15.0,
+        speed_step_rpm: 100.0 / 7.0,
+        current_share: 0.02,
+        current_coloured_share: 0.01,
+        current_coloured_s: 60.0,
+        current_white_a: 0.1,
+        current_step_a: 0.01,
+    };
+    let world = quiet(&BLADES);
+    let with = World { telemetry: Some(telemetry), ..world.clone() };
+    let (plain, told) = (flown(&world, 1), flown(&with, 1));
+    let hover = (22.0, 28.0);
+    for (message, field) in [("RCOU", "pulse"), ("XKF1", "VD"), ("ATT", "Pitch")] {
+        assert_eq!(mean(&plain, message, field, hover), mean(&told, message, field, hover));
+    }
+    // Thrust goes with the square of the speed: climbing takes more of it through the inflow.
+    let (level, climb) =
+        (mean(&told, "ESC", "RPM", hover), mean(&told, "ESC", "RPM", (35.0, 48.0)));
+    assert!(climb > 1.01 * level, "{level} {climb}");
+    let current = mean(&told, "BAT", "Curr", hover) / mean(&plain, "BAT", "Curr", hover);
+    assert!((current - 1.0).abs() < 0.08 && current != 1.0, "{current}");
+    let log = Log::from_bytes(plain);
+    let (tables, _) = log.select(&[Select { message: "ESC", fields: &["RPM"] }]);
+    assert!(tables.iter().all(|table| table.number("RPM").is_none_or(<[f64]>::is_empty)));
+    // A thrust law has no rotor speed to tell.
+    let law = World { telemetry: Some(telemetry), ..quiet(&LAW) };
+    let (tables, _) =
+        Log::from_bytes(flown(&law, 1)).select(&[Select { message: "ESC", fields: &["RPM"] }]);
+    assert!(tables.iter().all(|table| table.number("RPM").is_none_or(<[f64]>::is_empty)));
 }
 
 #[test]

@@ -77,6 +77,7 @@ pub(crate) fn quiet(plant: &Plant) -> World {
             rate_hz: 10.0,
         },
         hidden: Vec::new(),
+        telemetry: None,
     }
 }
 
