@@ -43,7 +43,7 @@ use super::warning::Warning;
 use super::wind_forms::{Belief, WindForms};
 use super::wind_legs;
 use crate::flight::Indicator;
-use crate::mission::plan::{Group, Purpose};
+use crate::mission::plan::{Group, Purpose, Segment, SegmentKind};
 
 /// Progress callback, called after each log with (logs done, logs in all).
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
@@ -270,8 +270,8 @@ fn one_of(shared: &Shared<'_>, log: &LogInput, slot: &SlotMatch) -> Result<One, 
     }
 }
 
-/// The legs of a measurement that calibrate the wind, by which its own hovers are corrected: its logs are read for
-/// them first, so that not all of them are in memory at once.
+/// The legs of a measurement that calibrate the wind, by which it is corrected itself: its logs are read for them first,
+/// so that not all of them are in memory at once.
 fn own_legs(
     input: &FlightInput<'_>,
     options: &AnalysisOptions,
@@ -279,7 +279,10 @@ fn own_legs(
     work: &[(&LogInput, &SlotMatch)],
 ) -> Option<WindLegs> {
     let plan = input.plan?;
-    let calibrates = |group: &Group| group.segments.iter().any(|segment| segment.calibrates_wind);
+    let calibrates = |group: &Group| {
+        let leg = |segment: &Segment| segment.kind == SegmentKind::Horizontal;
+        group.segments.iter().any(|segment| leg(segment) && segment.window.is_some())
+    };
     if !plan.groups.iter().any(calibrates) {
         return None;
     }

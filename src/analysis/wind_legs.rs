@@ -65,6 +65,9 @@ pub struct WindLeg {
     pub change_us: f64,
     /// Vertical speed, over that of these hovers, m/s.
     pub climb_mps: f64,
+    /// The air is measured along it: its lean tells the drag, and its pulse is what is measured.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_track: bool,
 }
 
 /// The horizontal legs of a flight.
@@ -79,38 +82,40 @@ pub struct WindLegs {
 }
 
 impl WindLegs {
-    /// The legs of a flight; `None` with fewer than two. Those that a scan is measured along are none.
+    /// The legs of a flight; `None` with fewer than two. Of those that a scan is measured along only the lean counts.
     pub(super) fn of(plan: &Plan, drones: &[DroneAnalysis]) -> Option<Self> {
-        let mut found: BTreeMap<(u64, String), (Vec<Flown>, [f64; 2])> = BTreeMap::new();
+        let mut found: BTreeMap<(u64, String), OneLeg> = BTreeMap::new();
         for drone in drones {
             let Some(slot) = drone.slot.and_then(|slot| plan.slot(slot)) else { continue };
             for segment in plan.segments(slot) {
                 let Some(window) = segment.window else { continue };
-                let calibrates = plan.purpose == Purpose::Calibration || segment.calibrates_wind;
-                if segment.kind != SegmentKind::Horizontal || !calibrates {
+                if segment.kind != SegmentKind::Horizontal {
                     continue;
                 }
+                let is_track = plan.purpose == Purpose::Measurement && !segment.calibrates_wind;
                 let start_s = window.start_ms as f64 / 1000.0;
-                let Some(flown) = Flown::of(&drone.windows, start_s) else { continue };
+                let Some(flown) = Flown::of(&drone.windows, start_s, is_track) else { continue };
                 let [x, y, _] = segment.velocity_mps;
                 let key = (window.start_ms, segment.label.clone());
-                found.entry(key).or_insert_with(|| (Vec::new(), [x, y])).0.push(flown);
+                found.entry(key).or_insert_with(|| (Vec::new(), [x, y], is_track)).0.push(flown);
             }
         }
         let over = |flown: &[Flown], value: fn(&Flown) -> f64| {
             mean(flown.iter().map(value)).unwrap_or_default()
         };
-        let hover_leans = found.values().flat_map(|(flown, _)| flown).map(|one| one.hover_lean_deg);
+        let hover_leans =
+            found.values().flat_map(|(flown, ..)| flown).map(|one| one.hover_lean_deg);
         let hover_lean_deg = mean(hover_leans)?;
         let legs: Vec<WindLeg> = found
             .iter()
-            .map(|((_, label), (flown, ground_mps))| WindLeg {
+            .map(|((_, label), (flown, ground_mps, is_track))| WindLeg {
                 label: label.clone(),
                 ground_mps: *ground_mps,
                 drones: flown.len(),
                 lean_deg: over(flown, |one| one.lean_deg),
                 change_us: over(flown, |one| one.change_us),
                 climb_mps: over(flown, |one| one.climb_mps),
+                is_track: *is_track,
             })
             .collect();
         let noise_us = noise_us(drones);
@@ -139,6 +144,7 @@ impl WindLegs {
                 lean_deg,
                 change_us: change_us - hover_us,
                 climb_mps: 0.0,
+                is_track: false,
             }
         };
         Self { legs: ground_mps.iter().map(leg).collect(), hover_lean_deg, noise_us }
@@ -180,6 +186,9 @@ pub fn bought(
     Bought { without_mps: error(&forms.prior()), with_mps: error(&with) }
 }
 
+/// What the drones flew of a leg, its velocity over ground, show frame, m/s, and whether the air is measured along it.
+type OneLeg = (Vec<Flown>, [f64; 2], bool);
+
 /// One drone on one leg.
 struct Flown {
     lean_deg: f64,
@@ -189,12 +198,21 @@ struct Flown {
 }
 
 impl Flown {
-    fn of(windows: &[WindowStats], start_s: f64) -> Option<Self> {
+    /// The one that starts at a time. A track tells its lean beside all hovers, wherever these are.
+    fn of(windows: &[WindowStats], start_s: f64, is_track: bool) -> Option<Self> {
         let leg = windows.iter().find(|window| {
             window.kind == SegmentKind::Horizontal && (window.start_s - start_s).abs() < 0.01
         })?;
         if !leg.rejected.is_empty() {
             return None;
+        }
+        if is_track {
+            let hovers = windows
+                .iter()
+                .filter(|window| window.kind.is_hover() && window.rejected.is_empty());
+            let hover_lean_deg = mean(hovers.map(|hover| hover.lean_deg))?;
+            let (change_us, climb_mps) = (0.0, 0.0);
+            return Some(Self { lean_deg: leg.lean_deg, change_us, climb_mps, hover_lean_deg });
         }
         let hovers = || {
             windows.iter().filter(|window| {
@@ -292,6 +310,13 @@ impl Fit<'_> {
             let [vx, vy] = leg.ground_mps;
             let air_mps = (vx - x).hypot(vy - y);
             let wanted = level(air_mps);
+            if leg.is_track {
+                let left = Vector2::new(tangent(leg.lean_deg) - wanted.x, 0.0);
+                // Nothing is told by its pulse.
+                let noise = Matrix2::new(noise(air_mps)[(0, 0)], 0.0, 0.0, 1.0);
+                found.push((left, noise));
+                continue;
+            }
             let change_us = leg.change_us - self.slope * leg.climb_mps;
             let left =
                 Vector2::new(tangent(leg.lean_deg) - wanted.x, change_us - (wanted.y - hover.y));

@@ -408,8 +408,8 @@ impl Output {
             .filter_map(|drone| {
                 let [x, y] = drone.position_m.filter(|p| usable(p[0]) && usable(p[1]))?;
                 let cell = [(x * 2.0).round() as i64, (y * 2.0).round() as i64];
-                usable(drone.mean.value)
-                    .then(|| (cell, drone.mean.value, signed(drone.mean.value, 2)))
+                let value = drone.posterior_mean.unwrap_or(drone.mean).value;
+                usable(value).then(|| (cell, value, signed(value, 2)))
             })
             .collect();
         let distinct = |axis: usize| {
@@ -424,7 +424,13 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.wrapped(DIM, "  ", "Means over the hover (the paper's Fig. 5, averaged), seen from above, forward is up; · no data");
+        let is_posterior = map.drones.iter().any(|drone| drone.posterior_mean.is_some());
+        let means =
+            if is_posterior { "Posterior means over the hover" } else { "Means over the hover" };
+        let words = format!(
+            "{means} (the paper's Fig. 5, averaged), seen from above, forward is up; · no data"
+        );
+        self.wrapped(DIM, "  ", &words);
         for row in rows {
             let mut line = String::from("  ");
             for &column in &columns {

@@ -9,7 +9,7 @@ use crate::numeric::{self, Moments};
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
-use crate::report::colour::{BLUE, VERMILLION};
+use crate::report::colour::{BLUE, GREEN, VERMILLION};
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, usable};
 
@@ -19,6 +19,8 @@ struct Instant {
     mean: f64,
     sd: f64,
     truth: Option<f64>,
+    /// Mean of the posterior.
+    posterior: Option<f64>,
 }
 
 /// Mean truth of a drone over the times that it was estimated at.
@@ -51,11 +53,16 @@ fn instants(map: &UpdraftMap) -> Vec<Instant> {
                 drone.updraft_mps.get(index).copied().flatten()?;
                 drone.truth_mps.as_ref()?.get(index).copied()
             });
+            let posterior = map
+                .drones
+                .iter()
+                .filter_map(|drone| drone.posterior_mps.get(index).copied().flatten());
             Some(Instant {
                 time_s,
                 mean: mean(estimates.clone())?,
                 sd: deviation(estimates).unwrap_or(0.0),
                 truth: mean(truths),
+                posterior: mean(posterior),
             })
         })
         .collect()
@@ -71,8 +78,10 @@ pub(in crate::report) fn figure(
     if instants.len() < 2 {
         return None;
     }
-    let reach =
-        instants.iter().flat_map(|i| [i.mean - i.sd, i.mean + i.sd, i.truth.unwrap_or(i.mean)]);
+    let reach = instants.iter().flat_map(|i| {
+        let [truth, posterior] = [i.truth, i.posterior].map(|value| value.unwrap_or(i.mean));
+        [i.mean - i.sd, i.mean + i.sd, truth, posterior]
+    });
     let time = Axis::time(instants.iter().map(|instant| instant.time_s));
     let y = Axis::around("updraft W* (m/s, up positive)", reach.chain([0.0]), 0.1);
     let single = map.drones.len() == 1;
@@ -91,6 +100,13 @@ pub(in crate::report) fn figure(
         LegendShape::Line,
         "",
     );
+    let has_posterior = instants.iter().any(|i| i.posterior.is_some());
+    if has_posterior {
+        let line: Vec<(f64, f64)> =
+            instants.iter().map(|i| (i.time_s, i.posterior.unwrap_or(f64::NAN))).collect();
+        panel.line(&line, GREEN, 1.8, "");
+        panel.entry("posterior", GREEN, LegendShape::Line, "");
+    }
     let truth: Vec<(f64, f64)> =
         instants.iter().map(|i| (i.time_s, i.truth.unwrap_or(f64::NAN))).collect();
     let known = truth.iter().any(|point| point.1.is_finite());
@@ -114,6 +130,9 @@ pub(in crate::report) fn figure(
          between drones."
             .to_owned()
     };
+    if has_posterior {
+        caption.push_str(" Green: the posterior, the estimate of all values together.");
+    }
     if known {
         caption.push_str(if single {
             " Dashed: the true air beside it."

@@ -31,9 +31,13 @@ use whiten::Whitening;
 
 /// Thermals that are looked for, at most. Chosen.
 const MOST: usize = 4;
-/// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again. Neighbours
-/// stand for all values, and forms for the field's own: fields without a thermal reach 9 (docs/errors.md).
+/// What the evidence for a thermal must exceed that for none by, nats, once the air's scales are found again: fields without a
+/// thermal reach 1 (docs/errors.md).
 const WORTH: f64 = 5.0;
+/// The same where neighbours stand for all values: fields reach 9, as a thermal explains some of what neighbours miss.
+const WORTH_BY_NEIGHBOURS: f64 = 12.0;
+/// A thermal in quiet air must be worth so much to be followed, nats.
+const WORTH_A_LOOK: f64 = 12.0;
 /// Rounds in which scales and thermal are found again.
 const ROUNDS: usize = 3;
 /// A field that may have been taken for a thermal's is tried so much weaker, too (logarithm).
@@ -135,7 +139,8 @@ impl Looked<'_> {
             let Some(none) = self.evidence(&left, &scales) else { break };
             let Some(one) = self.one(&left, region, scales) else { break };
             let odds = one.evidence - none;
-            if odds < WORTH {
+            let by_all = Whitening::is_of_all(&left);
+            if odds < if by_all { WORTH } else { WORTH_BY_NEIGHBOURS } {
                 break;
             }
             left = without(&left, &one.candidate);
@@ -198,7 +203,7 @@ impl Looked<'_> {
         let mut quiet = scales;
         quiet.1[LN_SD] += QUIET;
         let second = look(&quiet)?;
-        if second.log_odds < WORTH {
+        if second.log_odds < WORTH_A_LOOK {
             return None;
         }
         let starts = first.into_iter().chain([second]).filter(|start| is_met(rows, start));

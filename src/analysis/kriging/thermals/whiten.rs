@@ -23,7 +23,7 @@ enum Uncorrelated<'a> {
 impl<'a> Uncorrelated<'a> {
     fn new(rows: &Rows, neighbours: &'a Neighbours, covariance: &Covariance) -> Option<Self> {
         let list = &rows.list;
-        if list.len() > MOST_AT_ONCE {
+        if !Whitening::is_of_all(rows) {
             let each = neighbours.patterns.iter();
             let weights: Option<Vec<Weights>> =
                 each.map(|pattern| weights(pattern, covariance, true)).collect();
@@ -96,6 +96,11 @@ impl White {
 }
 
 impl<'a> Whitening<'a> {
+    /// Whether all values of a record are made white at once.
+    pub(super) fn is_of_all(rows: &Rows) -> bool {
+        rows.list.len() <= MOST_AT_ONCE
+    }
+
     /// Of the air of a covariance; `factor` is that of the common errors' prior, `own_mps` are the standard errors of the
     /// drones' constants. `None` where rounding leaves no positive definite covariance.
     pub(super) fn new(
