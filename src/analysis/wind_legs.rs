@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::result::DroneAnalysis;
-use super::wind_forms::{Belief, WindForms};
+use super::wind_forms::{Belief, FORM_SHARE, WindForms};
 use super::window::WindowStats;
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
@@ -32,6 +32,8 @@ const LEAN_RAD: f64 = 0.004;
 /// Gusts of the wind over a leg, as a share of the wind, and at least, m/s. Chosen: 10 to 15 % over flat land.
 const GUST_SHARE: f64 = 0.12;
 const LEAST_GUST_MPS: f64 = 0.1;
+/// Air speeds that differ by less are alike to what no form describes, m/s. Chosen.
+const ALIKE_MPS: f64 = 1.5;
 /// Prior standard deviation of the wind along each axis, m/s.
 const WIND_MPS: f64 = 6.0;
 /// Winds from which the search starts, m/s, in so many directions.
@@ -280,22 +282,26 @@ impl Fit<'_> {
         let hover = level(hover_mps);
         // The air of a leg and that of the hovers around it.
         let pulse_us = legs.noise_us.max(LEAST_NOISE_US) * 1.5_f64.sqrt();
-        let noise = |air_mps: f64| {
+        let air_of = |leg: &WindLeg| (leg.ground_mps[0] - x).hypot(leg.ground_mps[1] - y);
+        let noise = |air_mps: f64, compared: Vector2<f64>| {
             let by_gust = slope_at(air_mps) * gust_mps;
-            Matrix2::new(LEAN_RAD * LEAN_RAD, 0.0, 0.0, pulse_us * pulse_us)
+            // What no form describes is the same on all legs at one air speed: these do not average it away.
+            let alike = |leg: &&WindLeg| (air_of(leg) - air_mps).abs() < ALIKE_MPS;
+            let alike = legs.legs.iter().filter(alike).count().max(1) as f64;
+            let form = (FORM_SHARE * compared).map(|value| value * value * alike);
+            Matrix2::new(LEAN_RAD * LEAN_RAD + form.x, 0.0, 0.0, pulse_us * pulse_us + form.y)
                 + by_gust * by_gust.transpose()
         };
         let tangent = |lean_deg: f64| lean_deg.to_radians().tan();
         let of_hover = Vector2::new(tangent(legs.hover_lean_deg) - hover.x, 0.0);
-        let mut found = vec![(of_hover, noise(hover_mps))];
+        let mut found = vec![(of_hover, noise(hover_mps, Vector2::new(hover.x, 0.0)))];
         for leg in &legs.legs {
-            let [vx, vy] = leg.ground_mps;
-            let air_mps = (vx - x).hypot(vy - y);
+            let air_mps = air_of(leg);
             let wanted = level(air_mps);
             let change_us = leg.change_us - self.slope * leg.climb_mps;
             let left =
                 Vector2::new(tangent(leg.lean_deg) - wanted.x, change_us - (wanted.y - hover.y));
-            found.push((left, noise(air_mps)));
+            found.push((left, noise(air_mps, Vector2::new(wanted.x, wanted.y - hover.y))));
         }
         found
     }
