@@ -178,7 +178,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         })
         .collect();
     FlightAnalysis {
-        indicator: crate::flight::Indicator::Pulse,
+        indicator: Indicator::Pulse,
         orientation_deg: None,
         statistics: None,
         wind_legs: None,
