@@ -217,7 +217,7 @@ fn combined_words(combined: &CombinedMap) -> String {
         .iter()
         .map(|one| {
             let rms_mps = one.rms_mps.unwrap_or(f64::NAN);
-            format!("{rms_mps:.3} ({:.2}, {:.3})", one.weight, one.residual_mps)
+            format!("{rms_mps:.3} ({:.2}, {:.3})", one.weight, one.own_mps)
         })
         .collect();
     let (rms_mps, rest_mps) = combined

@@ -202,6 +202,8 @@ pub fn analyze_flight(
         lean_table: input.lean_table,
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
+        indicator: options.indicator,
+        unit: 0.0,
     };
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
     let by_forms = input.wind_forms.map(|forms| {

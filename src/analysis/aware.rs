@@ -64,6 +64,7 @@ pub(super) struct Aware<'a> {
     corrections: Corrections<'a>,
     pub(super) zero: Zero,
     pub(super) battery: Option<BatteryCorrection>,
+    /// Indicator per vertical air speed of the drones' lines.
     slope: f64,
     /// Logarithms of the evidence for a line and for a signed quadratic, where they were compared.
     evidence: Option<[f64; 2]>,
@@ -89,7 +90,7 @@ impl<'a> Aware<'a> {
 
     /// Pulse per vertical air speed of the drones' lines, us/(m/s).
     pub(super) fn slope(&self) -> f64 {
-        self.slope
+        self.slope / self.corrections.per_us()
     }
 
     /// Places of the calibration's drones on the level, show frame, m.
@@ -138,6 +139,10 @@ impl<'a> Aware<'a> {
             .map(|slope| slope.value)
             .collect();
         let slope = if slopes.is_empty() { TYPICAL_SLOPE } else { mean_sd(&slopes).0 };
+        // Priors and doubts are written for pulses: what another indicator says counts in us of a usual pulse.
+        let indicator = reference.indicator;
+        let unit = if indicator.is_pulse() || slope <= 0.0 { 0.0 } else { slope / TYPICAL_SLOPE };
+        let corrections = Corrections { indicator, unit, ..corrections };
         let mut packs = reference.drones.iter().filter_map(|drone| pack_of(drone, battery));
         let sigmas = corrections.sigmas(packs.next().as_ref());
         let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
@@ -231,6 +236,12 @@ impl<'a> Aware<'a> {
         (one, raw)
     }
 
+    /// Noise of a mean over one second, us; `slope`: pulse per vertical speed, us/(m/s).
+    fn noise_us(&self, hover: &Hover, slope: f64) -> f64 {
+        let per_us = self.corrections.per_us();
+        hover.noise_us(slope * per_us) / per_us
+    }
+
     /// Values of the seconds with their errors; the referred seconds that have one, with their air
     /// speed, m/s.
     fn seconds(
@@ -262,7 +273,7 @@ impl<'a> Aware<'a> {
                 continue;
             };
             known.push((one, air_mps));
-            let noise_us = hover.noise_us(values.slope(air_mps)) / RUNNING.sqrt();
+            let noise_us = self.noise_us(hover, values.slope(air_mps)) / RUNNING.sqrt();
             let error = values.error(&one.doubts_us, air_mps, sigmas);
             let half_us = error.half_us(self.zero.width, noise_us);
             let interval = values.interval(&one, values.level_us(&one, air_mps, half_us));
@@ -366,7 +377,7 @@ impl<'a> Aware<'a> {
             std::array::from_fn(|column| over(&|(_, air)| values.shape.basis(*air)[column]));
         error.common_us2 = values.common_us2(&error.basis);
         let slope = values.slope(air_mps);
-        let noise_us = hover.noise_us(slope) / n.sqrt();
+        let noise_us = self.noise_us(hover, slope) / n.sqrt();
         let half_us = error.half_us(self.zero.width, noise_us);
         let end = |offset: f64| {
             over(&|(one, air)| {
@@ -463,7 +474,13 @@ fn points(
             let is_used = window.kind.is_leg() || hovers && window.kind.is_hover();
             if window.rejected.is_empty() && is_used {
                 let referred = corrections.refer(&Raw::of(window), pack.as_ref(), slope);
-                points.push(point(index, (key, number), window, &referred, slope));
+                points.push(point(
+                    index,
+                    (key, number),
+                    window,
+                    &referred,
+                    [slope, corrections.per_us()],
+                ));
             }
         }
     }
@@ -475,7 +492,7 @@ fn point(
     key: (String, usize),
     window: &WindowStats,
     referred: &Referred,
-    slope: f64,
+    [slope, per_us]: [f64; 2],
 ) -> WindowPoint {
     WindowPoint {
         drone,
@@ -485,7 +502,7 @@ fn point(
         height_m: window.height_m,
         velocity_mps: referred.velocity_mps,
         pulse_us: referred.pulse_us,
-        noise_us: window.effort_phi.se.hypot(slope * window.velocity_mps.se),
+        noise_us: window.effort_phi.se.hypot(slope * window.velocity_mps.se) / per_us,
         doubts_us: referred.doubts_us,
     }
 }

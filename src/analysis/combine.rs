@@ -1,23 +1,27 @@
 //! One estimate of the air from several indicators of rotor effort.
 //!
-//! Pulse, rotor speed and power of one flight see the same air through errors of their own (battery, motors, noise).
-//! How large these are, and how far they go together, is told by what the calibration's windows leave over from each
-//! indicator's line. The weights are those of least variance.
+//! Pulse, rotor speed and power of one flight see the same air, after a calibration in the same air, through errors of
+//! their own (battery, motors, sensors, noise). Only these tell how to weigh them: what a calibration's windows leave over
+//! from each indicator's line is mostly the air that all of them met, and weights that make it small take the air
+//! of the hover out as well. The indicators' own errors are what their maps of the hover differ by: of three, each
+//! one's part follows from the differences of the pairs (the three-cornered hat: Gray and Allan 1974), of two each has a
+//! half. What moves a whole map (battery, wind, density) no difference within the hover tells: it is that of the maps' own
+//! errors. The weights are those of least variance of errors that are independent.
 
-use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::budget::TruthCheck;
-use super::kind::Symbol;
-use super::result::{DroneAnalysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
+use super::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 use super::truth;
 use crate::flight::Indicator;
-use crate::mission::plan::Purpose;
 use crate::numeric::mean;
 
-/// Fewest windows that all indicators have.
-const FEWEST_WINDOWS: usize = 10;
+/// Fewest values that all indicators have.
+const FEWEST_VALUES: usize = 10;
+/// Least share of the pairs' mean variance that is an indicator's own: a difference of variances may be nothing by
+/// chance. Chosen.
+const LEAST_SHARE: f64 = 0.05;
 /// A combination that lowers the error by less than this share is no better than the best indicator. Chosen.
 const WORTH: f64 = 0.02;
 
@@ -26,12 +30,10 @@ const WORTH: f64 = 0.02;
 pub struct CombinedMap {
     /// The indicators with their errors and weights.
     pub indicators: Vec<CombinedIndicator>,
-    /// Correlation of the indicators' errors.
-    pub correlation: Vec<Vec<f64>>,
-    /// Windows of the calibration that tell them.
-    pub windows: usize,
-    /// Error of one window by all indicators together, m/s.
-    pub residual_mps: f64,
+    /// Values of the hover that tell them.
+    pub values: usize,
+    /// Error of all indicators together that is not that of the calibration's air, m/s.
+    pub own_mps: f64,
     /// Whether that is lower than the best indicator's alone by 2 % or more.
     pub lowers: bool,
     /// The drones' estimates at the map's times.
@@ -48,9 +50,9 @@ pub struct CombinedMap {
 pub struct CombinedIndicator {
     /// The indicator.
     pub indicator: Indicator,
-    /// What one window of the calibration leaves over from its line, m/s.
-    pub residual_mps: f64,
-    /// Weight; the weights' sum is 1, and one may be negative where errors go together.
+    /// Error of one value that other indicators do not share, m/s.
+    pub own_mps: f64,
+    /// Weight; the weights' sum is 1.
     pub weight: f64,
     /// Error of its own map against the true air, root mean square, m/s, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,31 +72,34 @@ pub struct CombinedDrone {
     pub updraft_mps: Vec<Option<f64>>,
 }
 
-/// Combines the maps of one flight that were made of several indicators: its calibration and its map by each of them.
-/// `None` where they have too few windows or values in common.
-pub fn combine(seen: &[(&FlightAnalysis, &FlightAnalysis)]) -> Option<CombinedMap> {
-    let calibrations: Vec<&FlightAnalysis> =
-        seen.iter().map(|(calibration, _)| *calibration).collect();
-    let maps: Option<Vec<&UpdraftMap>> = seen.iter().map(|(_, hover)| hover.map.as_ref()).collect();
+/// Combines the maps of one flight that were made of several indicators. `None` where they have too few values in
+/// common.
+pub fn combine(seen: &[&FlightAnalysis]) -> Option<CombinedMap> {
+    let maps: Option<Vec<&UpdraftMap>> = seen.iter().map(|hover| hover.map.as_ref()).collect();
     let maps = maps.filter(|maps| maps.len() > 1)?;
-    let rows = residuals_mps(&calibrations);
-    if rows.len() < FEWEST_WINDOWS {
+    let series = series_of(&maps);
+    let values = series.iter().map(Vec::len).sum();
+    if values < FEWEST_VALUES {
         return None;
     }
     let n = maps.len();
-    // Errors as they were seen; believed is less of what goes together, which would make weights wild.
-    let covariance = covariance_of(&rows, n, 1.0);
-    let believed = 1.0 - ((n + 1) as f64 / rows.len() as f64).min(1.0);
-    let sd = |index: usize| covariance[(index, index)].max(0.0).sqrt();
-    let best = (0..n).min_by(|one, other| sd(*one).total_cmp(&sd(*other)))?;
-    let weights = least_variance(&covariance_of(&rows, n, believed))?;
-    let together_mps = (weights.transpose() * &covariance * &weights)[(0, 0)].max(0.0).sqrt();
-    let lowers = together_mps < (1.0 - WORTH) * sd(best);
+    let within = own_variances(&pairs(&series, n));
+    let own: Vec<f64> =
+        within.iter().zip(&maps).map(|(within, map)| within + systematic(map)).collect();
+    let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+    let sum: f64 = own.iter().map(|variance| variance.recip()).sum();
+    if !(least > 0.0 && sum.is_finite()) {
+        return None;
+    }
+    let together_mps = sum.recip().sqrt();
+    let best_mps = least.sqrt();
+    let lowers = together_mps < (1.0 - WORTH) * best_mps;
     // Weights that lower nothing are not used.
-    let best_alone = DVector::from_fn(n, |index, _| if index == best { 1.0 } else { 0.0 });
-    let weights = if lowers { weights } else { best_alone };
-    let best_mps = sd(best);
-    let residual_mps = if lowers { together_mps } else { best_mps };
+    let best = own.iter().position(|variance| *variance <= least)?;
+    let alone = |index: usize| f64::from(u8::from(index == best));
+    let weight = |index: usize| if lowers { own[index].recip() / sum } else { alone(index) };
+    let weights: Vec<f64> = (0..n).map(weight).collect();
+    let own_mps = if lowers { together_mps } else { best_mps };
     let first = maps.first()?;
     let drones: Vec<CombinedDrone> =
         first.drones.iter().filter_map(|drone| together(drone, first, &maps, &weights)).collect();
@@ -112,21 +117,16 @@ pub fn combine(seen: &[(&FlightAnalysis, &FlightAnalysis)]) -> Option<CombinedMa
         .collect();
     let indicators: Vec<CombinedIndicator> = (0..n)
         .map(|index| CombinedIndicator {
-            indicator: seen[index].1.indicator,
-            residual_mps: sd(index),
+            indicator: seen[index].indicator,
+            own_mps: own[index].sqrt(),
             weight: weights[index],
             rms_mps: maps[index].truth.map(|truth| truth.rms_mps),
         })
         .collect();
     let mut found = CombinedMap {
         indicators,
-        correlation: (0..n)
-            .map(|row| {
-                (0..n).map(|column| covariance[(row, column)] / (sd(row) * sd(column))).collect()
-            })
-            .collect(),
-        windows: rows.len(),
-        residual_mps,
+        values,
+        own_mps,
         lowers,
         drones,
         truth: truth::check(&checked),
@@ -140,71 +140,84 @@ fn same(drone: &DroneUpdraft, slot: Option<u16>, name: &str) -> bool {
     if slot.is_some() { drone.slot == slot } else { drone.name == name }
 }
 
-/// What each window leaves over from its drone's line, m/s, by each indicator.
-fn residuals_mps(calibrations: &[&FlightAnalysis]) -> Vec<Vec<f64>> {
-    let Some(first) = calibrations.first() else { return Vec::new() };
-    let counterparts = |drone: &DroneAnalysis| -> Option<Vec<&DroneAnalysis>> {
-        let same = |other: &&DroneAnalysis| other.slot == drone.slot && other.name == drone.name;
-        calibrations.iter().map(|flight| flight.drones.iter().find(same)).collect()
+/// The values of each drone that all maps have: at each second one of each map.
+fn series_of(maps: &[&UpdraftMap]) -> Vec<Vec<Vec<f64>>> {
+    let Some(first) = maps.first() else { return Vec::new() };
+    let of_drone = |drone: &DroneUpdraft| {
+        let drones = counterparts(drone, maps)?;
+        let values = first.time_s.iter().filter_map(|time_s| at(maps, &drones, *time_s));
+        Some(values.collect::<Vec<Vec<f64>>>())
     };
-    let mut rows = Vec::new();
-    for drone in &first.drones {
-        let Some(drones) = counterparts(drone) else { continue };
-        for window in drone.windows.iter().filter(|window| window.kind.is_leg()) {
-            let of = |one: &&DroneAnalysis| {
-                let line = one.laws.as_ref()?.linear.as_ref()?;
-                let (slope, level) = (line.value(Symbol::Slope)?, line.value(Symbol::U0)?);
-                let there = one.windows.iter().find(|other| other.start_s == window.start_s)?;
-                let effort = there.effort_phi.trimmed - there.offset_us.unwrap_or_default();
-                let left = (effort - level) / slope - there.velocity_mps.trimmed;
-                (there.rejected.is_empty() && left.is_finite()).then_some(left)
-            };
-            let row: Option<Vec<f64>> = drones.iter().map(of).collect();
-            rows.extend(row);
+    first.drones.iter().filter_map(of_drone).collect()
+}
+
+/// A drone in each of the maps.
+fn counterparts<'a>(
+    drone: &DroneUpdraft,
+    maps: &[&'a UpdraftMap],
+) -> Option<Vec<&'a DroneUpdraft>> {
+    let of =
+        |map: &&'a UpdraftMap| map.drones.iter().find(|other| same(other, drone.slot, &drone.name));
+    maps.iter().map(of).collect()
+}
+
+/// The values of a drone by all maps at a time; `None` where one has none.
+fn at(maps: &[&UpdraftMap], drones: &[&DroneUpdraft], time_s: f64) -> Option<Vec<f64>> {
+    let of = |(map, drone): (&&UpdraftMap, &&DroneUpdraft)| {
+        let offset = time_s - map.time_s.first()?;
+        let index = (offset >= -0.5).then(|| offset.round() as usize)?;
+        drone.updraft_mps.get(index).copied().flatten()
+    };
+    maps.iter().zip(drones).map(of).collect()
+}
+
+/// Mean squares by which the maps of each pair differ, without the mean difference of all.
+fn pairs(series: &[Vec<Vec<f64>>], n: usize) -> Vec<Vec<f64>> {
+    let square = |one: usize, other: usize| {
+        let differences = || series.iter().flatten().map(|values| values[one] - values[other]);
+        let middle = mean(differences()).unwrap_or_default();
+        mean(differences().map(|difference| (difference - middle).powi(2))).unwrap_or_default()
+    };
+    (0..n).map(|one| (0..n).map(|other| square(one, other)).collect()).collect()
+}
+
+/// Each indicator's own part of the differences, as variances.
+fn own_variances(pairs: &[Vec<f64>]) -> Vec<f64> {
+    let n = pairs.len();
+    let sum: f64 = pairs.iter().flatten().sum::<f64>() / 2.0;
+    let usual = sum / (n * (n - 1) / 2) as f64 / 2.0;
+    let own = |index: usize| {
+        if n == 2 {
+            return usual;
         }
-    }
-    rows
+        let with: f64 = pairs[index].iter().sum();
+        (with - sum / (n - 1) as f64) / (n - 2) as f64
+    };
+    (0..n).map(|index| own(index).max(2.0 * LEAST_SHARE * usual)).collect()
 }
 
-/// Covariance of the indicators' errors, of which a share is believed off the diagonal: with few windows errors go
-/// together by chance.
-fn covariance_of(rows: &[Vec<f64>], n: usize, believed: f64) -> DMatrix<f64> {
-    let centre: Vec<f64> =
-        (0..n).map(|column| mean(rows.iter().map(|row| row[column])).unwrap_or_default()).collect();
-    DMatrix::from_fn(n, n, |row, column| {
-        let product = |one: &Vec<f64>| (one[row] - centre[row]) * (one[column] - centre[column]);
-        let value = mean(rows.iter().map(product)).unwrap_or_default();
-        if row == column { value } else { believed * value }
-    })
-}
-
-/// Weights with the sum 1 under which the error is least.
-fn least_variance(covariance: &DMatrix<f64>) -> Option<DVector<f64>> {
-    let ones = DVector::from_element(covariance.nrows(), 1.0);
-    let solved = covariance.clone().cholesky()?.solve(&ones);
-    let sum = solved.sum();
-    (sum.is_finite() && sum > 0.0).then(|| solved / sum)
+/// Variance of what moves a whole map and has nothing to do with the air of the calibration, (m/s)².
+fn systematic(map: &UpdraftMap) -> f64 {
+    let of = |drone: &DroneUpdraft| {
+        let errors = drone.errors;
+        [errors.battery_mps, errors.wind_mps, errors.density_mps]
+            .iter()
+            .map(|error| error * error)
+            .sum::<f64>()
+    };
+    mean(map.drones.iter().map(of)).unwrap_or_default()
 }
 
 fn together(
     drone: &DroneUpdraft,
     first: &UpdraftMap,
     maps: &[&UpdraftMap],
-    weights: &DVector<f64>,
+    weights: &[f64],
 ) -> Option<CombinedDrone> {
-    let drones: Option<Vec<&DroneUpdraft>> = maps
-        .iter()
-        .map(|map| map.drones.iter().find(|other| same(other, drone.slot, &drone.name)))
-        .collect();
-    let drones = drones?;
+    let drones = counterparts(drone, maps)?;
     let value = |time_s: &f64| {
-        let of = |(map, drone): (&&UpdraftMap, &&DroneUpdraft)| {
-            let offset = time_s - map.time_s.first()?;
-            let index = (offset >= -0.5).then(|| offset.round() as usize)?;
-            drone.updraft_mps.get(index).copied().flatten()
-        };
-        let values: Option<Vec<f64>> = maps.iter().zip(&drones).map(of).collect();
-        Some(values?.iter().zip(weights.iter()).map(|(value, weight)| value * weight).sum())
+        let values = at(maps, &drones, *time_s)?;
+        Some(values.iter().zip(weights).map(|(value, weight)| value * weight).sum())
     };
     let updraft_mps: Vec<Option<f64>> = first.time_s.iter().map(value).collect();
     Some(CombinedDrone {
@@ -218,12 +231,7 @@ fn together(
 fn sentence(found: &CombinedMap, best_mps: f64) -> String {
     let one = |of: &CombinedIndicator| {
         let rms = of.rms_mps.map_or_else(String::new, |rms| format!(", map {rms:.3} off"));
-        format!(
-            "{} {:.3} m/s (weight {:.2}{rms})",
-            of.indicator.words(),
-            of.residual_mps,
-            of.weight
-        )
+        format!("{} {:.3} m/s (weight {:.2}{rms})", of.indicator.words(), of.own_mps, of.weight)
     };
     let each: Vec<String> = found.indicators.iter().map(one).collect();
     let truth = found.truth.map_or_else(String::new, |truth| {
@@ -232,18 +240,15 @@ fn sentence(found: &CombinedMap, best_mps: f64) -> String {
     let verdict = if found.lowers {
         format!(
             "together {:.3} m/s, {:.0} % less than the best alone",
-            found.residual_mps,
-            100.0 * (1.0 - found.residual_mps / best_mps)
+            found.own_mps,
+            100.0 * (1.0 - found.own_mps / best_mps)
         )
     } else {
-        format!(
-            "together no better than the best alone, {:.3} m/s, which stands",
-            found.residual_mps
-        )
+        format!("together no better than the best alone, {:.3} m/s, which stands", found.own_mps)
     };
     format!(
-        "several indicators, by what {} windows of the calibration leave over: {}; {verdict}{truth}",
-        found.windows,
+        "several indicators, by errors of their own over {} values: {}; {verdict}{truth}",
+        found.values,
         each.join(", ")
     )
 }
@@ -251,22 +256,14 @@ fn sentence(found: &CombinedMap, best_mps: f64) -> String {
 /// Adds the combination to the maps of the first of several analyses of the same flights, each with another indicator.
 pub fn add(analyses: &mut [super::result::Analysis]) {
     let Some((first, others)) = analyses.split_first_mut() else { return };
-    let calibration = |flights: &[FlightAnalysis]| {
-        flights.iter().position(|one| one.purpose == Purpose::Calibration)
-    };
     for index in 0..first.flights.len() {
         if first.flights[index].map.is_none() {
             continue;
         }
         let name = first.flights[index].name.clone();
         let all = || std::iter::once(&*first).chain(&*others);
-        let seen: Option<Vec<(&FlightAnalysis, &FlightAnalysis)>> = all()
-            .map(|analysis| {
-                let calibration = analysis.flights.get(calibration(&analysis.flights)?)?;
-                let hover = analysis.flights.iter().find(|one| one.name == name)?;
-                Some((calibration, hover))
-            })
-            .collect();
+        let seen: Option<Vec<&FlightAnalysis>> =
+            all().map(|analysis| analysis.flights.iter().find(|one| one.name == name)).collect();
         let combined = seen.and_then(|seen| combine(&seen));
         if let Some(map) = &mut first.flights[index].map {
             map.combined = combined;
@@ -280,36 +277,37 @@ mod tests {
     use crate::base::rng::{Purpose as Stream, stream};
     use rand_distr::{Distribution as _, StandardNormal};
 
-    /// Errors of two indicators, a part of which they share.
-    fn rows(count: usize) -> Vec<Vec<f64>> {
+    /// Values of indicators with these errors of their own, and twice as much of air that all see.
+    fn series(own_mps: &[f64]) -> Vec<Vec<Vec<f64>>> {
         let mut rng = stream(4, 0, Stream::Sensors);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        (0..count)
-            .map(|_| {
-                let shared = 0.1 * normal();
-                vec![shared + 0.3 * normal(), shared + 0.15 * normal()]
-            })
-            .collect()
+        let mut values = || {
+            let air_mps = 2.0 * normal();
+            own_mps.iter().map(|own| air_mps + own * normal() + 0.7 * own).collect()
+        };
+        (0..10).map(|_| (0..400).map(|_| values()).collect()).collect()
     }
 
     #[test]
-    fn weights_are_those_of_the_least_variance() {
-        let covariance = covariance_of(&rows(4000), 2, 1.0);
-        let weights = least_variance(&covariance).unwrap();
-        // Own variances 0.09 and 0.0225, whatever is shared: a fifth and four fifths.
-        assert!((weights[0] - 0.2).abs() < 0.02, "{weights}");
-        let error = (weights.transpose() * &covariance * &weights)[(0, 0)].sqrt();
-        // 0.01 shared, and 0.09 with 0.0225 by their inverses: 0.028.
-        assert!((error - 0.028_f64.sqrt()).abs() < 0.006, "{error}");
-        assert!(error < covariance[(1, 1)].sqrt());
+    fn three_indicators_tell_their_own_errors_whatever_the_air() {
+        let own_mps = [0.3, 0.15, 0.6];
+        let found = own_variances(&pairs(&series(&own_mps), 3));
+        for (found, own) in found.iter().zip(own_mps) {
+            assert!((found.sqrt() / own - 1.0).abs() < 0.1, "{found} {own}");
+        }
+        let [one, other] = own_variances(&pairs(&series(&[0.3, 0.1]), 2))[..] else { panic!() };
+        assert_eq!(one, other, "two do not tell whose the difference is");
+        assert!((one - 0.05).abs() < 0.004, "{one}");
     }
 
     #[test]
-    fn a_share_of_what_goes_together_is_believed() {
-        let rows = rows(12);
-        let (half, whole) = (covariance_of(&rows, 2, 0.5), covariance_of(&rows, 2, 1.0));
-        assert!((half[(0, 1)] / whole[(0, 1)] - 0.5).abs() < 1e-9);
-        assert_eq!(half[(0, 0)], whole[(0, 0)]);
-        assert_eq!(least_variance(&DMatrix::zeros(2, 2)), None);
+    fn no_indicator_is_without_an_error() {
+        // The third is the mean of the others: of its own it would have less than nothing.
+        let mut series = series(&[0.3, 0.3, 0.0]);
+        for values in series.iter_mut().flatten() {
+            values[2] = f64::midpoint(values[0], values[1]);
+        }
+        let found = own_variances(&pairs(&series, 3));
+        assert!(found.iter().all(|variance| *variance > 0.0), "{found:?}");
     }
 }

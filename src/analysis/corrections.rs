@@ -10,6 +10,7 @@ use super::density::Density;
 use super::lean_table::{DIRECTIONS, LeanTable};
 use super::wind::Leaning;
 use super::window::WindowStats;
+use crate::flight::Indicator;
 
 /// Doubts in their order: battery, drift, wind, density, and the wind's second direction.
 pub(super) const DOUBTS: usize = 5;
@@ -26,6 +27,9 @@ pub(super) const WINDS: [usize; DIRECTIONS] = [WIND, 4];
 
 /// Pulse at which the rotors make no thrust, us.
 const NO_THRUST_US: f64 = 1000.0;
+/// Standard error of the exponent of density for rotor speed: by Reynolds numbers of small blades. Chosen. That of power
+/// has motors in it, as the pulse's.
+const SPEED_DENSITY_EXPONENT: f64 = 0.03;
 /// Time constant of warming motors and controllers, s: 60 to 200 s (docs/physics.md, 5.4).
 const WARM_UP_S: f64 = 100.0;
 /// Drift where a battery acts on the pulse and its voltage is not known: standard error, us per
@@ -64,6 +68,10 @@ pub(super) struct Corrections<'a> {
     /// Share of `u - 1000` that a pack whose voltage is not known may have changed, where the law is
     /// referred to a voltage: standard error ([`super::battery::unknown_share`]).
     pub(super) unknown_share: f64,
+    /// Indicator of rotor effort that "pulses" are of.
+    pub(super) indicator: Indicator,
+    /// Its unit for one us of the pulses that priors and doubts are written for; 0: it is the pulse.
+    pub(super) unit: f64,
 }
 
 /// A stretch of flight as logged.
@@ -107,7 +115,24 @@ pub(super) struct Referred {
     pub(super) steeper: f64,
 }
 
+impl Referred {
+    /// The same in other units.
+    fn in_units_of(self, unit: f64) -> Self {
+        Self {
+            velocity_mps: self.velocity_mps,
+            pulse_us: self.pulse_us / unit,
+            doubts_us: self.doubts_us.map(|doubt| doubt / unit),
+            steeper: self.steeper / unit,
+        }
+    }
+}
+
 impl Corrections<'_> {
+    /// The indicator's unit for one us.
+    pub(super) fn per_us(&self) -> f64 {
+        if self.unit == 0.0 { 1.0 } else { self.unit }
+    }
+
     /// Whether the vehicle's drag is known, so that wind is corrected for.
     pub(super) fn knows_wind(&self) -> bool {
         self.leaning.is_some() || self.lean_table.is_some()
@@ -130,6 +155,7 @@ impl Corrections<'_> {
         sigmas[DENSITY] = match self.density {
             // AirSim's thrust is linear by definition; the weather of the day is not the standard's.
             Some(density) if density.exponent == 1.0 => 0.0,
+            Some(_) if self.indicator == Indicator::RotorSpeed => SPEED_DENSITY_EXPONENT,
             Some(_) => DENSITY_EXPONENT,
             None => UNKNOWN_DENSITY_EXPONENT,
         };
@@ -164,7 +190,8 @@ impl Corrections<'_> {
             // Leaning by drag, the thrust is m g cos(phi); by acceleration, m g / cos(phi). Neither
             // is corrected; translational lift is more than both.
             let cos = raw.lean_deg.to_radians().cos();
-            doubts_us[WIND] = UNKNOWN_WIND_US * raw.lean_deg.powi(2) + THRUST_US * (1.0 - cos);
+            let most_us = UNKNOWN_WIND_US * raw.lean_deg.powi(2) + THRUST_US * (1.0 - cos);
+            doubts_us[WIND] = most_us * self.per_us();
         }
         let log_density = match self.density {
             Some(density) => {
@@ -173,7 +200,7 @@ impl Corrections<'_> {
             }
             None => -raw.height_m / DENSITY_SCALE_M,
         };
-        doubts_us[DENSITY] = (pulse_us - NO_THRUST_US) * log_density;
+        doubts_us[DENSITY] = (pulse_us - self.indicator.without_thrust()) * log_density;
         let flown_s = raw.time_s.max(0.0);
         let warm = self.warm_up_us.unwrap_or_default() * (1.0 - (-flown_s / WARM_UP_S).exp());
         if let Some((pack, resting_v)) = pack.zip(raw.resting_v) {
@@ -186,7 +213,7 @@ impl Corrections<'_> {
             let drift = UNKNOWN_VOLTAGE_US * flown_s / 60.0;
             doubts_us[DRIFT] = warm.hypot(drift).hypot(level);
         }
-        Referred { velocity_mps, pulse_us, doubts_us, steeper }
+        Referred { velocity_mps, pulse_us, doubts_us, steeper }.in_units_of(self.per_us())
     }
 }
 
@@ -237,7 +264,9 @@ mod tests {
 
     #[test]
     fn the_doubt_of_the_density_is_by_what_is_known_of_the_thrust_curve() {
-        let density = |exponent| Some(Density { ground_amsl_m: 190.0, exponent });
+        let density = |exponent| {
+            Some(Density { ground_amsl_m: 190.0, exponent, indicator: Indicator::Pulse })
+        };
         let sigma =
             |density| Corrections { density, ..Corrections::default() }.sigmas(None)[DENSITY];
         assert_eq!(sigma(density(1.0)), 0.0, "by definition");

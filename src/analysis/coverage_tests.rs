@@ -17,7 +17,7 @@ use super::measured::Measured;
 use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
-use crate::flight::{Clock, Effort, Flight, Series};
+use crate::flight::{Clock, Effort, Flight, Indicator, Series};
 use crate::mission::plan::{Purpose, SegmentKind};
 
 const DRONES: usize = 4;
@@ -89,7 +89,7 @@ impl World {
     }
 
     fn density() -> Density {
-        Density { ground_amsl_m: 190.0, exponent: 0.4 }
+        Density { ground_amsl_m: 190.0, exponent: 0.4, indicator: Indicator::Pulse }
     }
 }
 
@@ -178,7 +178,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         })
         .collect();
     FlightAnalysis {
-        indicator: crate::flight::Indicator::Pulse,
+        indicator: Indicator::Pulse,
         orientation_deg: None,
         statistics: None,
         wind_legs: None,

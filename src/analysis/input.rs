@@ -85,7 +85,7 @@ impl FlightInput<'_> {
             Indicator::RotorSpeed | Indicator::Power => {
                 let lean_table = self.lean_table.filter(|table| table.indicator == indicator);
                 Self {
-                    density: None,
+                    density: self.density.map(|density| density.of(indicator)),
                     leaning: None,
                     sag: None,
                     wind_forms: None,

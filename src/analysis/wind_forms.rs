@@ -24,7 +24,7 @@ const USUAL_CLIMB_MPS: f64 = 2.0;
 /// Standard error of the change of the pulse that is left where all sizes are known, as a share of it: the nearest
 /// vehicle of this form to a plant of blade elements is up to 2.7 us off, of 40 us in strong wind (the tests of
 /// `blind::worlds::identify`).
-const FORM_SHARE: f64 = 0.05;
+pub(super) const FORM_SHARE: f64 = 0.05;
 /// What the directions of a table leave of a doubt is added to them, up to this factor. Numerical: where they leave
 /// most, the doubt is small.
 const MOST_WIDER: f64 = 3.0;

@@ -10,12 +10,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::result::DroneAnalysis;
-use super::wind_forms::{Belief, WindForms};
+use super::wind_forms::{Belief, FORM_SHARE, WindForms};
 use super::window::WindowStats;
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
@@ -32,6 +32,8 @@ const LEAN_RAD: f64 = 0.004;
 /// Gusts of the wind over a leg, as a share of the wind, and at least, m/s. Chosen: 10 to 15 % over flat land.
 const GUST_SHARE: f64 = 0.12;
 const LEAST_GUST_MPS: f64 = 0.1;
+/// Air speeds that differ by less are alike to what no form describes, m/s. Chosen.
+const ALIKE_MPS: f64 = 1.5;
 /// Prior standard deviation of the wind along each axis, m/s.
 const WIND_MPS: f64 = 6.0;
 /// Winds from which the search starts, m/s, in so many directions.
@@ -65,6 +67,9 @@ pub struct WindLeg {
     pub change_us: f64,
     /// Vertical speed, over that of these hovers, m/s.
     pub climb_mps: f64,
+    /// Lean of these hovers, degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hover_lean_deg: Option<f64>,
     /// The air is measured along it: its lean tells the drag, and its pulse is what is measured.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_track: bool,
@@ -115,6 +120,7 @@ impl WindLegs {
                 lean_deg: over(flown, |one| one.lean_deg),
                 change_us: over(flown, |one| one.change_us),
                 climb_mps: over(flown, |one| one.climb_mps),
+                hover_lean_deg: Some(over(flown, |one| one.hover_lean_deg)),
                 is_track: *is_track,
             })
             .collect();
@@ -144,6 +150,7 @@ impl WindLegs {
                 lean_deg,
                 change_us: change_us - hover_us,
                 climb_mps: 0.0,
+                hover_lean_deg: Some(hover_lean_deg),
                 is_track: false,
             }
         };
@@ -235,32 +242,40 @@ impl Flown {
     }
 }
 
-/// Standard error of the fleet's mean pulse in a hover, us, with the air that all met: by hovers at one height that
-/// follow each other.
+/// Standard error of the fleet's mean pulse in a hover, us, with the air that all met, apart from what gusts do that lean
+/// it: by hovers at one height that follow each other.
 fn noise_us(drones: &[DroneAnalysis]) -> f64 {
-    let mut cells: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();
+    let mut cells: BTreeMap<i64, Vec<[f64; 3]>> = BTreeMap::new();
     for window in drones.iter().flat_map(|drone| &drone.windows) {
         if window.kind.is_hover() && window.rejected.is_empty() {
             let at = (window.start_s * 1000.0).round() as i64;
-            cells.entry(at).or_default().push((window.effort.mean, window.height_m));
+            let cell = [window.effort.mean, window.height_m, window.lean_deg.to_radians()];
+            cells.entry(at).or_default().push(cell);
         }
     }
-    let means: Vec<(f64, f64, f64)> = cells
+    let means: Vec<(f64, [f64; 3])> = cells
         .iter()
         .filter_map(|(start_ms, cell)| {
-            let pulse_us = mean(cell.iter().map(|(pulse_us, _)| *pulse_us))?;
-            let height_m = mean(cell.iter().map(|(_, height_m)| *height_m))?;
-            Some((*start_ms as f64 / 1000.0, pulse_us, height_m))
+            let of = |index: usize| mean(cell.iter().map(|one| one[index]));
+            Some((*start_ms as f64 / 1000.0, [of(0)?, of(1)?, of(2)?]))
         })
         .collect();
-    let mut squares = Vec::new();
-    for (index, (time_s, pulse_us, height_m)) in means.iter().enumerate() {
-        let next = means[index + 1..]
-            .iter()
-            .find(|next| (next.2 - height_m).abs() < NEAR_M && next.0 < time_s + 2.0 * NEAR_S);
-        squares.extend(next.map(|next| (next.1 - pulse_us).powi(2) / 2.0));
+    let mut steps: Vec<[f64; 2]> = Vec::new();
+    for (index, (time_s, [pulse_us, height_m, lean])) in means.iter().enumerate() {
+        let next = means[index + 1..].iter().find(|(at_s, next)| {
+            (next[1] - height_m).abs() < NEAR_M && *at_s < time_s + 2.0 * NEAR_S
+        });
+        steps.extend(next.map(|(_, next)| [next[0] - pulse_us, next[2] - lean]));
     }
-    mean(squares).unwrap_or_default().sqrt().max(LEAST_NOISE_US)
+    if steps.len() < 2 {
+        return LEAST_NOISE_US;
+    }
+    // Gusts of the wind count on their own: what goes with the lean is theirs.
+    let product: f64 = steps.iter().map(|[pulse_us, lean]| pulse_us * lean).sum();
+    let by_lean = product / steps.iter().map(|[_, lean]| lean * lean).sum::<f64>().max(1e-12);
+    let squares: f64 =
+        steps.iter().map(|[pulse_us, lean]| (pulse_us - by_lean * lean).powi(2)).sum();
+    (squares / 2.0 / (steps.len() - 1) as f64).sqrt().max(LEAST_NOISE_US)
 }
 
 /// The search: doubts of the forms, then for each flight its wind along show x and y.
@@ -270,8 +285,8 @@ struct Fit<'a> {
     slope: f64,
 }
 
-/// What is left of a leg's lean and change, and their covariance.
-type Left = (Vector2<f64>, Matrix2<f64>);
+/// What is left of a leg's lean, its change of the pulse and its hovers' lean, and their covariance.
+type Left = (Vector3<f64>, Matrix3<f64>);
 
 impl Fit<'_> {
     fn doubts(&self) -> usize {
@@ -282,7 +297,7 @@ impl Fit<'_> {
         self.doubts() + 2 * self.flown.len()
     }
 
-    /// What a point leaves of a flight: of the hovers' lean (with no pulse), and of each leg.
+    /// What a point leaves of each leg of a flight. A gust moves lean and pulse together, of the leg and of its hovers.
     fn left(&self, flight: usize, at: &DVector<f64>) -> Vec<Left> {
         let n = self.doubts();
         let legs = self.flown[flight];
@@ -296,33 +311,49 @@ impl Fit<'_> {
         };
         let hover_mps = x.hypot(y);
         let hover = level(hover_mps);
+        let count = legs.legs.len() as f64;
         // The air of a leg and that of the hovers around it.
         let pulse_us = legs.noise_us.max(LEAST_NOISE_US) * 1.5_f64.sqrt();
-        let noise = |air_mps: f64| {
-            let by_gust = slope_at(air_mps) * gust_mps;
-            Matrix2::new(LEAN_RAD * LEAN_RAD, 0.0, 0.0, pulse_us * pulse_us)
-                + by_gust * by_gust.transpose()
-        };
+        let air_of = |leg: &WindLeg| (leg.ground_mps[0] - x).hypot(leg.ground_mps[1] - y);
         let tangent = |lean_deg: f64| lean_deg.to_radians().tan();
-        let of_hover = Vector2::new(tangent(legs.hover_lean_deg) - hover.x, 0.0);
-        let mut found = vec![(of_hover, noise(hover_mps))];
-        for leg in &legs.legs {
-            let [vx, vy] = leg.ground_mps;
-            let air_mps = (vx - x).hypot(vy - y);
+        let lean2 = LEAN_RAD * LEAN_RAD;
+        let at_hover = slope_at(hover_mps) * gust_mps;
+        let by_hover = Vector3::new(0.0, -at_hover.y, at_hover.x);
+        let one = |leg: &WindLeg| {
+            let air_mps = air_of(leg);
             let wanted = level(air_mps);
-            if leg.is_track {
-                let left = Vector2::new(tangent(leg.lean_deg) - wanted.x, 0.0);
-                // Nothing is told by its pulse.
-                let noise = Matrix2::new(noise(air_mps)[(0, 0)], 0.0, 0.0, 1.0);
-                found.push((left, noise));
-                continue;
-            }
+            let compared = wanted.y - hover.y;
             let change_us = leg.change_us - self.slope * leg.climb_mps;
-            let left =
-                Vector2::new(tangent(leg.lean_deg) - wanted.x, change_us - (wanted.y - hover.y));
-            found.push((left, noise(air_mps)));
-        }
-        found
+            let hover_lean_deg = leg.hover_lean_deg.unwrap_or(legs.hover_lean_deg);
+            let mut left = Vector3::new(
+                tangent(leg.lean_deg) - wanted.x,
+                change_us - compared,
+                tangent(hover_lean_deg) - hover.x,
+            );
+            // What no form describes is the same on all legs at one air speed: these do not average it away.
+            let alike = |other: &&WindLeg| (air_of(other) - air_mps).abs() < ALIKE_MPS;
+            let alike = legs.legs.iter().filter(alike).count() as f64;
+            let mut form = Vector3::new(
+                alike * wanted.x * wanted.x,
+                alike * compared * compared,
+                count * hover.x * hover.x,
+            );
+            let alone = Vector3::new(lean2, pulse_us * pulse_us, count * lean2);
+            let at_leg = slope_at(air_mps) * gust_mps;
+            let mut by_leg = Vector3::new(at_leg.x, at_leg.y, 0.0);
+            let mut by_hover = by_hover;
+            if leg.is_track {
+                // Nothing is told by its pulse.
+                for of_pulse in [&mut left.y, &mut form.y, &mut by_leg.y, &mut by_hover.y] {
+                    *of_pulse = 0.0;
+                }
+            }
+            let noise = Matrix3::from_diagonal(&(alone + FORM_SHARE * FORM_SHARE * form))
+                + by_leg * by_leg.transpose()
+                + by_hover * by_hover.transpose();
+            (left, noise)
+        };
+        legs.legs.iter().map(one).collect()
     }
 
     /// Minus the logarithm of a flight's likelihood, without its constant, and its misfit.
@@ -355,7 +386,7 @@ impl Fit<'_> {
     fn normal(&self, flight: usize, at: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let p = at.len();
         let here = self.left(flight, at);
-        let columns: Vec<Vec<Vector2<f64>>> = (0..p)
+        let columns: Vec<Vec<Vector3<f64>>> = (0..p)
             .map(|place| {
                 let mut beside = at.clone();
                 beside[place] += STEP;
@@ -455,7 +486,7 @@ impl Fit<'_> {
         let mut normal = DMatrix::zeros(at.len(), at.len());
         for (flight, legs) in self.flown.iter().enumerate() {
             // Legs that scatter by more than they should tell less.
-            let free = (2 * legs.legs.len() + 1).saturating_sub(2).max(1) as f64;
+            let free = (3 * legs.legs.len()).saturating_sub(2).max(1) as f64;
             let worse = (self.cost_of(flight, &at).1 / free).max(1.0);
             normal += self.normal(flight, &at)?.0 / worse;
         }

@@ -50,6 +50,12 @@ impl Indicator {
         }
     }
 
+    /// Whether it is the pulse width.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives references")]
+    pub fn is_pulse(&self) -> bool {
+        *self == Self::Pulse
+    }
+
     /// Value of the indicator at which a rotor gives no thrust, in the indicator's unit.
     pub fn without_thrust(self) -> f64 {
         match self {

@@ -133,3 +133,36 @@ pub fn legs_buy(plan: &Plan, vehicle: &Vehicle) -> Option<String> {
 pub fn shows(mission: &Mission) -> Vec<Show> {
     mission.flights.iter().map(|flight| flight.plan.to_show()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::resolve::{Override, resolve};
+
+    fn told(template: &str, legs: &[&str]) -> Vec<Option<String>> {
+        let all = ["vehicle=pixel", "grid.rows=2"].iter().chain(legs);
+        let overrides: Vec<Override> = all.map(|text| Override::parse(text).unwrap()).collect();
+        let mission = resolve(template, &overrides).unwrap();
+        mission.flights.iter().map(|flight| legs_buy(&flight.plan, &flight.vehicle)).collect()
+    }
+
+    #[test]
+    fn it_is_told_what_legs_of_either_flight_buy() {
+        let legs = ["calibration.legs.speeds_mps=[3, 6]", "hover.legs.speeds_mps=[3, 6]"];
+        let [calibration, hover] = &told("campaign", &legs)[..] else { panic!("two flights") };
+        let (calibration, hover) = (calibration.as_ref().unwrap(), hover.as_ref().unwrap());
+        assert!(calibration.contains("moves a later map by"), "{calibration}");
+        assert!(hover.contains("moves this map by"), "{hover}");
+        for words in [calibration, hover] {
+            let numbers: Vec<f64> = words
+                .split("+-")
+                .skip(1)
+                .map(|part| part.split(' ').next().unwrap().parse().unwrap())
+                .collect();
+            let [with_5, without_5, with_8, without_8] = numbers[..] else { panic!("{words}") };
+            assert!(with_5 < without_5 && with_8 < without_8, "{words}");
+        }
+        assert_eq!(told("campaign", &legs[..1])[1], None);
+        assert_eq!(told("scan-campaign", &[]), [None, None], "a scan's own legs calibrate nothing");
+    }
+}

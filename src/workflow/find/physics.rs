@@ -5,6 +5,7 @@ use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::effects::Signal;
 use crate::effects::select::looks_at;
+use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::vehicle::Vehicle;
 
@@ -24,6 +25,7 @@ pub(super) fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
     Density {
         ground_amsl_m: plan.site.ground_amsl_m,
         exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+        indicator: Indicator::Pulse,
     }
 }
 

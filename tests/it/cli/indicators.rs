@@ -56,12 +56,14 @@ fn rotor_speed_and_power_measure_the_air_and_all_together_no_worse() {
     assert_eq!(names, ["pulse", "rotor_speed", "power"], "{told}");
     let weights: f64 = indicators.iter().map(|one| number(&one["weight"])).sum();
     assert!((weights - 1.0).abs() < 1e-9, "{told}");
-    let best =
-        indicators.iter().map(|one| number(&one["residual_mps"])).fold(f64::INFINITY, f64::min);
-    assert!(number(&combined["residual_mps"]) <= best + 1e-9, "{told}");
-    let worst = indicators.iter().map(|one| number(&one["rms_mps"])).fold(0.0, f64::max);
-    assert!(number(&combined["truth"]["rms_mps"]) < worst, "{told}");
-    assert!(told.contains("several indicators, by what"), "{told}");
+    let best = indicators.iter().map(|one| number(&one["own_mps"])).fold(f64::INFINITY, f64::min);
+    assert!(number(&combined["own_mps"]) <= best + 1e-9, "{told}");
+    assert!(indicators.iter().all(|one| number(&one["weight"]) >= 0.0), "{told}");
+    // Nothing of the air itself is weighed away: together they are not far from the best of them.
+    let errors = indicators.iter().map(|one| number(&one["rms_mps"]));
+    let least = errors.fold(f64::INFINITY, f64::min);
+    assert!(number(&combined["truth"]["rms_mps"]) < 1.2 * least + 0.01, "{told}");
+    assert!(told.contains("several indicators, by errors of their own"), "{told}");
 }
 
 #[test]

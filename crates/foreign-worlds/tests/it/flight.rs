@@ -56,14 +56,14 @@ fn telemetry_has_the_rotors_speed_and_changes_nothing_else() {
     };
     let world = quiet(&BLADES);
     let with = World { telemetry: Some(telemetry), ..world.clone() };
-    let (plain, told) = (flown(&world, 1), flown(&with, 1));
-    let hover = (22.0, 28.0);
+    let (plain, told) = (flown(&world).1, flown(&with).1);
+    let hover = (44.0, 49.0);
     for (message, field) in [("RCOU", "pulse"), ("XKF1", "VD"), ("ATT", "Pitch")] {
         assert_eq!(mean(&plain, message, field, hover), mean(&told, message, field, hover));
     }
     // Thrust goes with the square of the speed: climbing takes more of it through the inflow.
     let (level, climb) =
-        (mean(&told, "ESC", "RPM", hover), mean(&told, "ESC", "RPM", (35.0, 48.0)));
+        (mean(&told, "ESC", "RPM", hover), mean(&told, "ESC", "RPM", (25.0, 38.0)));
     assert!(climb > 1.01 * level, "{level} {climb}");
     let current = mean(&told, "BAT", "Curr", hover) / mean(&plain, "BAT", "Curr", hover);
     assert!((current - 1.0).abs() < 0.08 && current != 1.0, "{current}");
@@ -73,7 +73,7 @@ fn telemetry_has_the_rotors_speed_and_changes_nothing_else() {
     // A thrust law has no rotor speed to tell.
     let law = World { telemetry: Some(telemetry), ..quiet(&LAW) };
     let (tables, _) =
-        Log::from_bytes(flown(&law, 1)).select(&[Select { message: "ESC", fields: &["RPM"] }]);
+        Log::from_bytes(flown(&law).1).select(&[Select { message: "ESC", fields: &["RPM"] }]);
     assert!(tables.iter().all(|table| table.number("RPM").is_none_or(<[f64]>::is_empty)));
 }
 
