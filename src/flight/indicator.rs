@@ -51,7 +51,6 @@ impl Indicator {
     }
 
     /// Whether it is the pulse width.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives references")]
     pub fn is_pulse(&self) -> bool {
         *self == Self::Pulse
     }
