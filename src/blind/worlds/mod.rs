@@ -2,12 +2,13 @@
 //!
 //! The crate `foreign-worlds` flies them. Here a world is drawn ([`draw`]), its known vehicle is made
 //! ([`known`], by [`identify`] where no vehicle's file is the plant), and a plan is flown in it ([`fly`]);
-//! [`steady`] says what a hidden effect does to the pulse, for Fisher's z.
+//! [`maps`] flies campaigns for maps of the air; [`steady`] says what a hidden effect does to the pulse, for Fisher's z.
 
 pub mod draw;
 pub mod fly;
 pub mod identify;
 pub mod known;
+pub mod maps;
 pub mod steady;
 
 use schemars::JsonSchema;

@@ -3,6 +3,7 @@
 mod coverage;
 mod fleet;
 mod flight;
+mod foreign_maps;
 mod ladder;
 mod law;
 mod nist;

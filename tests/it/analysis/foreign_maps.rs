@@ -1,0 +1,69 @@
+//! Maps of campaigns in foreign worlds, against the true air and the best linear estimate of who knows its covariances.
+
+#![expect(clippy::unwrap_used, reason = "this is test code")]
+
+use updraft::analysis::budget::TruthCheck;
+use updraft::blind::worlds::maps;
+use updraft::campaign;
+use updraft::mission::resolve::Override;
+use updraft::workflow::analyze::{Analysing, Settings};
+use updraft::workflow::find::{Work, find};
+use updraft::workflow::host::Quiet;
+use updraft::workflow::{mission, plan};
+
+/// What one campaign of 16 drones gave: the map by each second alone, and the posterior.
+fn flown(kind: &str, seed: u64) -> [TruthCheck; 2] {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join(kind);
+    let set = |key: &str, value: f64| Override::new(key, value);
+    let overrides = [
+        Override::new("vehicle", "pixel"),
+        Override::new("grid.rows", 4),
+        Override::new("grid.columns", 4),
+        set("grid.spacing_m", 10.0),
+        set("duration_s", 180.0),
+    ];
+    let host = Quiet::default();
+    let planned = mission::resolve("campaign", &overrides).unwrap();
+    plan::write(&host, &planned, &plan::shows(&planned), &root, false).unwrap();
+    let truth = maps::fly(&campaign::flights(&root).unwrap(), kind, seed, None, None).unwrap();
+    let mut work = Work::new(&root);
+    find(&root, None, &mut work).unwrap();
+    let hover = work.flights.last_mut().unwrap();
+    hover.truth = truth.updraft;
+    hover.true_air = Some(truth.air);
+    let settings = Settings::default();
+    let analysing = Analysing::begin(&host, &work, &settings, None).unwrap();
+    let analysed = analysing.run(false).unwrap();
+    let map = analysed.analysis.flights.last().unwrap().map.clone().unwrap();
+    [map.truth.unwrap(), map.posterior.unwrap().truth.unwrap()]
+}
+
+#[test]
+fn the_posterior_is_near_the_best_linear_estimate() {
+    let mut sums = [0.0; 4];
+    let mut inside = 0.0;
+    let kinds = ["field", "gusty", "advected"];
+    for (kind, seed) in kinds.into_iter().zip([1701, 1801, 1901]) {
+        let [plain, posterior] = flown(kind, seed);
+        let (limit, at_limit) =
+            (posterior.limit_rms_mps.unwrap(), posterior.at_limit_rms_mps.unwrap());
+        println!(
+            "{kind}: each second alone {:.3} m/s, posterior {:.3} (rest {:.3}), {:.0} % inside; limit {limit:.3}, there {at_limit:.3}",
+            plain.rms_mps,
+            posterior.rms_mps,
+            posterior.rms_without_bias_mps,
+            100.0 * posterior.inside_share,
+        );
+        let squares = [plain.rms_mps, limit, at_limit, posterior.rms_without_bias_mps];
+        sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value * value);
+        inside += posterior.inside_share / kinds.len() as f64;
+    }
+    let [plain, limit, at_limit, rest] = sums.map(|sum: f64| (sum / kinds.len() as f64).sqrt());
+    println!(
+        "plain {plain:.3}, limit {limit:.3}, there {at_limit:.3}, rest {rest:.3}, inside {inside:.2}"
+    );
+    assert!(at_limit < 1.3 * limit, "{at_limit} {limit}");
+    assert!(at_limit < plain, "{at_limit} {plain}");
+    assert!(inside > 0.85, "{inside}");
+}
