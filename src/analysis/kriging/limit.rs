@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::covariance::{Air, Covariance};
-use super::data::{COMMON, Row, Rows};
+use super::data::{COMMON, Drone, Row, Rows};
 use super::make::{Input, prior_factor};
 use crate::analysis::running::RUNNING_S;
 
@@ -24,8 +24,12 @@ pub(in super::super) struct Best {
 }
 
 /// The best linear estimate in air of known scales, the sum of independent parts, without a uniform updraft: one value in 10 s of each drone, or fewer.
-/// `None` where the calibration does not determine the law.
+/// `None` where the calibration does not determine the law, and for drones that move: what the correction by lean leaves along a
+/// track has no covariance that anybody knows, and a smooth field that is known takes it for its own.
 pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>> {
+    if !input.drones.iter().all(Drone::hovers) {
+        return None;
+    }
     let step = RUNNING_S as usize;
     let first = (input.seconds.saturating_sub(1) % step) / 2;
     let mut rows = Rows::of(input.drones, first, step);
