@@ -1,4 +1,4 @@
-//! Means, medians, quantiles, straight lines and minima: the arithmetic that every room needs and none owns.
+//! Means, medians, quantiles, straight lines, minima and banded matrices: the arithmetic that every room needs and none owns.
 //!
 //! * **Nothing** has no mean, median or extent: the answer is `None`, and the caller says what stands for it.
 //! * **NaN** spoils means and lines, as in any sum. [`least`], [`most`] and [`extent`] pass over it.
