@@ -109,6 +109,7 @@ fn air(rng: &mut Pcg64, sd_mps: f64) -> AirSettings {
         time_s: log_between(rng, (40.0, 300.0)),
         is_advected: unit(rng) < 0.5,
         waves: None,
+        stretch: None,
     };
     let law = unit(rng);
     let shear = if law < 0.4 {

@@ -27,12 +27,14 @@ pub const KINDS: [&str; 8] =
     ["still", "field", "noisy", "gusty", "advected", "wind-change", "thermal", "drifting-thermal"];
 /// Share of logs that are lost.
 const LOST: f64 = 0.15;
+/// How many times as long anisotropic air is along show x as along y.
+const STRETCH: f64 = 3.0;
 /// Seconds of a running mean.
 const MEAN_S: usize = 10;
 /// Steps of the truth within a second.
 const STEPS: usize = 5;
 
-/// What is true of the last flight of a campaign.
+/// The truth about the last flight of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
     /// Mean vertical air speed over the 10 s around each second along each slot's planned way, m/s, up positive: from the
@@ -98,7 +100,14 @@ pub fn fly(
 /// Air of a kind in the first (calibration) or second flight.
 fn air(kind: &str, flight: usize) -> Option<AirSettings> {
     let field = |sd_mps, length_m, time_s, is_advected| {
-        Some(FieldSettings { sd_mps, length_m, time_s, is_advected, waves: Some(200) })
+        Some(FieldSettings {
+            sd_mps,
+            length_m,
+            time_s,
+            is_advected,
+            waves: Some(200),
+            stretch: None,
+        })
     };
     let still = AirSettings {
         updraft_mps: 0.0,
@@ -120,6 +129,11 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
         // `noisy` has noise of the pulses besides.
         "field" | "noisy" => AirSettings { field: field(0.5, 145.0, 186.0, false), ..still },
         "gusty" => AirSettings { field: field(0.5, 145.0, 186.0, false), own_mps: 0.25, ..still },
+        "anisotropic" => AirSettings {
+            field: field(0.5, 100.0, 186.0, false)
+                .map(|field| FieldSettings { stretch: Some(STRETCH), ..field }),
+            ..still
+        },
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }
@@ -173,10 +187,11 @@ fn thermal(plan: &Plan, seed: u64, drift_mps: [f64; 2]) -> ThermalSettings {
 fn scales(air: &AirSettings) -> TrueAir {
     let field = air.field.as_ref().map(|field| {
         let drift_mps = if field.is_advected { air.wind_mps } else { [0.0; 2] };
+        let root = field.stretch.map_or(1.0, f64::sqrt);
         TrueField {
             sd_mps: field.sd_mps,
-            lambda_m: SQRT_2 * field.length_m,
-            lambda_y_m: SQRT_2 * field.length_m,
+            lambda_m: SQRT_2 * field.length_m * root,
+            lambda_y_m: SQRT_2 * field.length_m / root,
             tau_s: SQRT_2 * field.time_s,
             wind_mps: drift_mps[0].hypot(drift_mps[1]),
             is_gaussian: true,

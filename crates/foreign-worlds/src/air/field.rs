@@ -25,6 +25,9 @@ pub struct FieldSettings {
     /// Number of waves; absent: 48. A record of a smooth field of few waves tells them from a Gaussian field's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub waves: Option<usize>,
+    /// How many times as long it is along show x as along y; `length_m` is then their geometric mean. Absent: once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<f64>,
 }
 
 /// A field of the updraft, with the Gaussian correlation of [`FieldSettings`].
@@ -48,9 +51,11 @@ impl Field {
         let mut rng = stream(seed, 0, Purpose::Field);
         let mut draw = |scale: f64| normal(&mut rng) / scale;
         let count = settings.waves.unwrap_or(WAVES);
+        let root = settings.stretch.map_or(1.0, f64::sqrt);
+        let lengths_m = [root, 1.0 / root, 1.0].map(|share| share * settings.length_m);
         let waves = (0..count)
             .map(|_| Wave {
-                number_radpm: [0; 3].map(|_| draw(settings.length_m)),
+                number_radpm: lengths_m.map(&mut draw),
                 rate_radps: draw(settings.time_s),
                 // A normal deviate of many turns is uniform on the circle.
                 phase_rad: draw(0.01),
@@ -85,6 +90,7 @@ mod tests {
             time_s: 1e4,
             is_advected: true,
             waves: None,
+            stretch: None,
         };
         let (mut variance, mut apart, mut drifted, mut stayed) = (0.0, 0.0, 0.0, 0.0);
         let count = 600;
@@ -101,5 +107,29 @@ mod tests {
         assert!((of(apart) - (-0.5_f64).exp()).abs() < 0.12, "{}", of(apart));
         assert!(of(drifted) > 0.98, "{}", of(drifted));
         assert!(of(stayed) < 0.3, "{}", of(stayed));
+    }
+
+    #[test]
+    fn it_is_longer_along_than_across_where_it_is_stretched() {
+        let settings = FieldSettings {
+            sd_mps: 0.5,
+            length_m: 60.0,
+            time_s: 1e4,
+            is_advected: false,
+            waves: None,
+            stretch: Some(4.0),
+        };
+        let (mut variance, mut along, mut across) = (0.0, 0.0, 0.0);
+        for seed in 0..600 {
+            let field = Field::new(&settings, [0.0; 2], seed);
+            let here = field.updraft_mps([0.0; 3], 0.0);
+            variance += here * here;
+            along += here * field.updraft_mps([120.0, 0.0, 0.0], 0.0);
+            across += here * field.updraft_mps([0.0, 30.0, 0.0], 0.0);
+        }
+        for (way, sum) in [("along", along), ("across", across)] {
+            let correlation = sum / variance;
+            assert!((correlation - (-0.5_f64).exp()).abs() < 0.12, "{way}: {correlation}");
+        }
     }
 }

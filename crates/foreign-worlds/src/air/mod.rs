@@ -156,6 +156,7 @@ mod tests {
                 time_s: 60.0,
                 is_advected: true,
                 waves: None,
+                stretch: None,
             }),
             thermal: None,
             wind_mps: [3.0, -4.0],
