@@ -203,7 +203,7 @@ pub fn analyze_flight(
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
         indicator: options.indicator,
-        unit: 0.0,
+        unit: None,
     };
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
     let by_forms = input.wind_forms.map(|forms| {

@@ -141,7 +141,7 @@ impl<'a> Aware<'a> {
         let slope = if slopes.is_empty() { TYPICAL_SLOPE } else { mean_sd(&slopes).0 };
         // Priors and doubts are written for pulses: what another indicator says counts in us of a usual pulse.
         let indicator = reference.indicator;
-        let unit = if indicator.is_pulse() || slope <= 0.0 { 0.0 } else { slope / TYPICAL_SLOPE };
+        let unit = (!indicator.is_pulse() && slope > 0.0).then(|| slope / TYPICAL_SLOPE);
         let corrections = Corrections { indicator, unit, ..corrections };
         let mut packs = reference.drones.iter().filter_map(|drone| pack_of(drone, battery));
         let sigmas = corrections.sigmas(packs.next().as_ref());

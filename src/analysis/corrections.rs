@@ -70,8 +70,8 @@ pub(super) struct Corrections<'a> {
     pub(super) unknown_share: f64,
     /// Indicator of rotor effort that "pulses" are of.
     pub(super) indicator: Indicator,
-    /// Its unit for one us of the pulses that priors and doubts are written for; 0: it is the pulse.
-    pub(super) unit: f64,
+    /// Its unit for one us of the pulses that priors and doubts are written for; `None`: it is the pulse.
+    pub(super) unit: Option<f64>,
 }
 
 /// A stretch of flight as logged.
@@ -130,7 +130,7 @@ impl Referred {
 impl Corrections<'_> {
     /// The indicator's unit for one us.
     pub(super) fn per_us(&self) -> f64 {
-        if self.unit == 0.0 { 1.0 } else { self.unit }
+        self.unit.unwrap_or(1.0)
     }
 
     /// Whether the vehicle's drag is known, so that wind is corrected for.

@@ -572,6 +572,22 @@ mod tests {
     }
 
     #[test]
+    fn tracks_tell_drag_by_their_leans_and_nothing_by_their_pulses() {
+        let truth = [-1.5, 1.0];
+        let mut scan = flown(truth);
+        for (index, leg) in scan.legs.iter_mut().enumerate() {
+            leg.is_track = true;
+            // The air that is measured along them.
+            leg.change_us += if index % 2 == 0 { 30.0 } else { -45.0 };
+        }
+        let belief = posterior(&[&scan], &forms(), 26.0);
+        let sd = |place: usize| belief.covariance[(place, place)].sqrt();
+        assert!((belief.mean[0] - truth[0]).abs() < 0.5, "drag {}", belief.mean[0]);
+        assert!(sd(0) < 0.6, "drag {}", sd(0));
+        assert!(belief.mean[1].abs() < 0.1 && sd(1) > 0.95, "lift {} {}", belief.mean[1], sd(1));
+    }
+
+    #[test]
     fn legs_that_scatter_tell_less() {
         let mut scattered = flown([0.0, 0.0]);
         let sure = posterior(&[&scattered], &forms(), 26.0).covariance.trace();

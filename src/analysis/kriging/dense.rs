@@ -10,6 +10,19 @@ use super::vecchia::{Common, CommonVector, Parts, System};
 /// The golden ratio's part after the point: multiples of it fill the unit interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
+/// Lower triangle of the factor of the covariance of values, with their noise; `None` where rounding leaves none that is
+/// positive definite.
+pub(super) fn factor(rows: &[Row], covariance: &Covariance) -> Option<DMatrix<f64>> {
+    let mut matrix = DMatrix::zeros(rows.len(), rows.len());
+    for (column, one) in rows.iter().enumerate() {
+        for (row, other) in rows.iter().enumerate().skip(column) {
+            matrix[(row, column)] = covariance.of(&other.spot, &one.spot);
+        }
+        matrix[(column, column)] += one.noise_mps * one.noise_mps;
+    }
+    Some(matrix.cholesky()?.unpack())
+}
+
 /// Some of the values of a record.
 #[derive(Clone, Debug)]
 pub(super) struct Dense {
@@ -29,17 +42,9 @@ impl Dense {
     /// The likelihood with everything linear left open; `own_mps` are standard errors of all drones' constants. `None`
     /// where rounding leaves no positive definite covariance.
     pub(super) fn system(&self, covariance: &Covariance, own_mps: &[f64]) -> Option<System> {
-        let n = self.rows.len();
-        let mut matrix = DMatrix::zeros(n, n);
-        for (column, one) in self.rows.iter().enumerate() {
-            for (row, other) in self.rows.iter().enumerate().skip(column) {
-                matrix[(row, column)] = covariance.of(&other.spot, &one.spot);
-            }
-            matrix[(column, column)] += one.noise_mps * one.noise_mps;
-        }
-        let factor = matrix.cholesky()?.unpack();
+        let factor = factor(&self.rows, covariance)?;
         let drones = own_mps.len();
-        let mut white = DMatrix::zeros(n, 1 + COMMON + drones);
+        let mut white = DMatrix::zeros(self.rows.len(), 1 + COMMON + drones);
         for (index, row) in self.rows.iter().enumerate() {
             white[(index, 0)] = row.value_mps;
             for column in 0..COMMON {

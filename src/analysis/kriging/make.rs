@@ -117,12 +117,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
         }
     }
     let found = forms.first()?;
-    let record = Record {
-        search: &Search { whole: None, coarse: None, ..search },
-        drones: input.drones,
-        found,
-        wind_mps: input.wind_mps,
-    };
+    let record = Record { search: &search, drones: input.drones, found, wind_mps: input.wind_mps };
     let thermals = record.thermals();
     let own_of = |air: &Air| -> Vec<f64> {
         // Air that each drone met alone in its calibration is in its constant.

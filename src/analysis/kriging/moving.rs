@@ -16,6 +16,7 @@ const TRIED_MPS: [f64; 5] = [-4.0, -2.0, 0.0, 2.0, 4.0];
 const DRIFT_MPS: f64 = 3.0;
 /// A drift must explain so much more than none, nats. Two more numbers are worth 3 in 95 % of all cases.
 const WORTH: f64 = 3.0;
+
 /// How fast the field drifts, m/s, if that explains more than that it stays.
 pub(super) fn drift(search: &Search<'_>, found: &Found) -> Option<[f64; 2]> {
     let mut point = found.best;

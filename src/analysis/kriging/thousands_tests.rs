@@ -8,7 +8,7 @@ use super::calibration::Calibration;
 use super::covariance::{Air, Covariance, Form};
 use super::data::{COMMON, Drone, Rows, UNIFORM, Value};
 use super::make::{Input, posterior};
-use super::moving_tests::{Case, Field};
+use super::moving_tests::{CASE, Field};
 use super::neighbours::{Reach, before};
 use super::predict::{Linear, Model};
 use super::scales::Search;
@@ -24,16 +24,6 @@ const NOISE_MPS: f64 = 0.03;
 const OWN_MPS: f64 = 0.04;
 const ZERO_MPS: f64 = 0.1;
 const SLOPE_US: f64 = 25.0;
-
-const CASE: Case = Case {
-    side: 0,
-    legs: 0,
-    heights_m: [60.0; 2],
-    length_m: 60.0,
-    time_s: 100.0,
-    drift_mps: [0.0; 2],
-    gust_mps: 0.0,
-};
 
 fn place_m(side: usize, index: usize) -> [f64; 3] {
     [SPACING_M * (index % side) as f64, SPACING_M * (index / side) as f64, 60.0]

@@ -116,7 +116,11 @@ impl Record<'_> {
         search.factor[(UNIFORM, UNIFORM)] = ZERO_MPS;
         let moves = self.drones.iter().any(|drone| !drone.hovers());
         let reach = if moves { REACH_OF_MOVING } else { REACH };
-        let neighbours = before(self.drones, rows, reach);
+        let neighbours = if Whitening::is_of_all(rows) {
+            Neighbours::default()
+        } else {
+            before(self.drones, rows, reach)
+        };
         let looked = Looked { search: &search, drones: self.drones, neighbours: &neighbours };
         looked.thermals(&region, (self.found.form, self.found.best))
     }
@@ -126,6 +130,7 @@ impl Record<'_> {
 struct Looked<'a> {
     search: &'a Search<'a>,
     drones: &'a [Drone],
+    /// None where all values are made white at once.
     neighbours: &'a Neighbours,
 }
 

@@ -5,6 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::analysis::kriging::covariance::Covariance;
 use crate::analysis::kriging::data::{COMMON, Rows};
+use crate::analysis::kriging::dense::factor;
 use crate::analysis::kriging::neighbours::Neighbours;
 use crate::analysis::kriging::vecchia::{Common, LEAST_OWN_MPS, Weights, weights};
 
@@ -22,21 +23,13 @@ enum Uncorrelated<'a> {
 
 impl<'a> Uncorrelated<'a> {
     fn new(rows: &Rows, neighbours: &'a Neighbours, covariance: &Covariance) -> Option<Self> {
-        let list = &rows.list;
         if !Whitening::is_of_all(rows) {
             let each = neighbours.patterns.iter();
             let weights: Option<Vec<Weights>> =
                 each.map(|pattern| weights(pattern, covariance, true)).collect();
             return Some(Self::Neighbours(neighbours, weights?));
         }
-        let mut matrix = DMatrix::zeros(list.len(), list.len());
-        for (column, one) in list.iter().enumerate() {
-            for (row, other) in list.iter().enumerate().skip(column) {
-                matrix[(row, column)] = covariance.of(&other.spot, &one.spot);
-            }
-            matrix[(column, column)] += one.noise_mps * one.noise_mps;
-        }
-        Some(Self::All(matrix.cholesky()?.unpack()))
+        factor(&rows.list, covariance).map(Self::All)
     }
 
     /// Logarithm of what records are divided by.
