@@ -8,8 +8,9 @@ pub mod json;
 pub mod layout;
 pub(crate) mod said;
 pub mod sentence;
+pub mod shard;
 
 pub use dataflash::time;
 pub use multirotor_sim::{air, rng};
 pub use skybrush_show::frame;
-pub use untrusted_io::{crc, file, number, parse, plain, private};
+pub use untrusted_io::{crc, file, number, owner, parse, plain, private};

@@ -163,6 +163,26 @@ pub enum BlindError {
         /// Format that this program reads.
         wanted: &'static str,
     },
+    /// A finished flight was made by another version of this program.
+    #[error(
+        "{} was made by {found}, this is {wanted}: one table is made by one version; choose another \
+         folder with -o",
+        path.shown()
+    )]
+    Version {
+        /// Path of the flight's file.
+        path: PathBuf,
+        /// Program and version that made it.
+        found: String,
+        /// Program and version that reads it.
+        wanted: String,
+    },
+    /// The flight is not finished, and nothing was to be flown.
+    #[error("flight {index} is missing")]
+    NotFlown {
+        /// Index of the flight in its table.
+        index: usize,
+    },
     /// The folder holds flights of other settings.
     #[error(
         "{} holds flight {index} of another table ({why}); choose another folder with -o",

@@ -13,6 +13,7 @@
 //!   analysis.json  report/index.html  fields/updraft.csv  fields/updraft.parquet
 //! ```
 
+pub mod items;
 pub mod lock;
 pub mod origin;
 pub mod start;
@@ -173,6 +174,17 @@ pub enum CampaignError {
     Busy {
         /// Path of the folder.
         path: PathBuf,
+    },
+    /// The folder has items (flights, cells) of other settings or another version.
+    #[error(
+        "{} has items of other settings ({why}); choose another folder with -o, or remove this one",
+        path.shown()
+    )]
+    OtherItems {
+        /// Path of the folder.
+        path: PathBuf,
+        /// Difference of the items there from those asked for, in words.
+        why: String,
     },
     /// The path is a file, not a folder.
     #[error("{} is not a campaign folder", path.shown())]

@@ -5,17 +5,21 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::analyze_each;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::origin::OriginChoice;
+use super::shard_args::ShardArgs;
 use super::words;
 use super::zero::ZeroStretch;
 use crate::analysis::result::Analysis;
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
 use crate::base::plain::Shown as _;
+use crate::base::shard::Share;
 use crate::flight::Indicator;
 use crate::report::terminal_summary;
+use crate::workflow::analyze::each::record_path;
 use crate::workflow::analyze::{
     Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
 };
@@ -33,6 +37,7 @@ const WIDTH: usize = 100;
   updraft analyze logs/ --plan my-campaign/calibration
   updraft analyze flight.BIN
   updraft analyze windy --hold still/analysis.json
+  updraft analyze --each season/*                 (each campaign by itself)
   updraft analyze --csv phantom4-mast.toml --zero 0..150s --vehicle phantom4
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found from
@@ -75,6 +80,11 @@ pub(super) struct AnalyzeArgs {
     /// Print the results, but write nothing
     #[arg(long)]
     no_report: bool,
+    /// Analyse each campaign by itself, into its own folder; those that are done are not done again
+    #[arg(long, conflicts_with_all = ["csv", "output", "no_report"])]
+    each: bool,
+    #[command(flatten)]
+    sharing: ShardArgs,
     #[command(flatten)]
     options: AnalyzeOptions,
 }
@@ -191,7 +201,8 @@ impl AnalyzeOptions {
         Self { plain, ..Self::default() }
     }
 
-    fn settings(&self) -> Settings {
+    /// The same for the library.
+    pub(super) fn settings(&self) -> Settings {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {
             TiltChoice::Paper => Tilt::Paper,
@@ -229,6 +240,29 @@ struct AnalyzeOutput<'a> {
 }
 
 impl AnalyzeArgs {
+    /// One request for each path.
+    pub(super) fn requests(&self) -> Vec<Request> {
+        let one = |path: &PathBuf| Request {
+            paths: vec![path.clone()],
+            plan: self.plan.clone(),
+            start_unix_s: self.start,
+            origin: self.logs.map(Into::into),
+            ..Request::default()
+        };
+        self.paths.iter().map(one).collect()
+    }
+
+    /// Records of the analyses of these campaigns, each by itself.
+    pub(super) fn results(&self) -> Result<Vec<PathBuf>, CommandError> {
+        let record = |request: &Request| Ok(record_path(&request.output()?));
+        self.requests().iter().map(record).collect()
+    }
+
+    /// What all of them have in common: settings, held laws, share.
+    pub(super) fn common(&self) -> (Settings, Option<&Path>, Share) {
+        (self.options.settings(), self.hold.as_deref(), self.sharing.share())
+    }
+
     /// The response and the level that tables are inverted with, if that was asked for.
     fn level(&self) -> Result<Option<LevelWish>, WorkflowError> {
         let asked = if self.zero.is_some() { "--zero" } else { "--vehicle" };
@@ -247,6 +281,15 @@ impl AnalyzeArgs {
 }
 
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
+    if args.each {
+        return analyze_each::run(context, args);
+    }
+    if args.sharing.shard.is_some() || args.sharing.no_fly {
+        return Err(WorkflowError::Usage(
+            "--shard and --no-fly are for many campaigns, each analysed by itself: give --each"
+                .to_owned(),
+        ));
+    }
     let request = Request {
         paths: args.paths.clone(),
         tables: args.csv.clone(),

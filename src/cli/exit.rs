@@ -86,6 +86,7 @@ pub fn exit_of(error: &CommandError) -> Exit {
         | E::Failed(_) => Exit::Failed,
         E::Effect(_) | E::Log(_) | E::Usage(_) => Exit::Usage,
         E::Nothing(_) => Exit::Nothing,
+        E::Missing { .. } => Exit::Losses,
         E::Unsafe(_) => Exit::Unsafe,
         E::Interrupted | E::Stopped(_) => Exit::Interrupted,
     }

@@ -1,8 +1,10 @@
 //! The command line: arguments, one file per subcommand, exit codes.
 
 mod analyze;
+mod analyze_each;
 mod blind;
 mod check;
+mod cluster;
 mod context;
 mod effects;
 mod effects_plot;
@@ -19,6 +21,7 @@ mod physics;
 mod plan;
 mod progress;
 mod run;
+mod shard_args;
 mod show_text;
 mod signals;
 mod simulate;
@@ -145,6 +148,8 @@ enum Command {
     Gap(gap::GapArgs),
     /// Test the search for missing physics on flights with hidden effects
     Blind(blind::BlindArgs),
+    /// Share work out to a cluster (Slurm): script, submit, status, cancel
+    Cluster(cluster::ClusterArgs),
     /// List the physical effects that can be flown, or explain one
     Effects(effects::EffectsArgs),
     /// Show what is in a file
@@ -173,6 +178,7 @@ pub fn main() -> ExitCode {
             return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
         }
     };
+    use_threads_of_job();
     let context = Context::new(&cli.global);
     match dispatch(&context, cli.command) {
         Ok(exit) => {
@@ -193,6 +199,18 @@ pub fn main() -> ExitCode {
             }
             exit_of(&error).into()
         }
+    }
+}
+
+/// Inside of a Slurm job that asked for a number of processors, so many threads are used: where jobs are not
+/// bound to theirs, the machine has more.
+fn use_threads_of_job() {
+    let variable = |name: &str| std::env::var(name).ok();
+    let is_job = variable("SLURM_JOB_ID").is_some() && variable("RAYON_NUM_THREADS").is_none();
+    let count = variable("SLURM_CPUS_PER_TASK").and_then(|text| text.parse().ok());
+    if let Some(count) = count.filter(|count| is_job && (1..=4096).contains(count)) {
+        // Only fails if threads were started already.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(count).build_global();
     }
 }
 
@@ -218,6 +236,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Sweep(args) => sweep::run(context, &args),
         Command::Gap(args) => gap::run(context, &args),
         Command::Blind(args) => blind::run(context, &args),
+        Command::Cluster(args) => cluster::run(context, &args),
         Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),

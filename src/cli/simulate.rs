@@ -7,11 +7,15 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::shard_args::{self, ShardArgs};
 use crate::campaign;
 use crate::effects;
 use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::vehicle::library;
-use crate::workflow::simulate::{Flown, Simulation, simulate, uniform_mps};
+use crate::workflow::share::ShardDone;
+use crate::workflow::simulate::{
+    Flown, Simulation, check_complete, numbered, simulate, uniform_mps,
+};
 use crate::workflow::slots::SlotSet;
 
 /// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
@@ -126,6 +130,7 @@ impl AirArgs {
   updraft simulate my-campaign --flight hover --updraft 1.5 --wind 5
   updraft simulate my-campaign --flight hover --air field:sd=0.5,lambda=145 --truth
   updraft simulate my-campaign --drones 1-10,12 --full-logs
+  updraft simulate my-campaign --shard 3/10       (every tenth drone, for one of ten processes)
 
 Existing logs that were flown with the same settings are kept, so an interrupted run can be resumed.
 Logs that have changed since (truncated, damaged) are flown again.
@@ -147,10 +152,12 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "NAME")]
     vehicle: Option<String>,
     /// Replace simulated logs that were flown with other settings
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["shard", "no_fly"])]
     force: bool,
     #[command(flatten)]
     air: AirArgs,
+    #[command(flatten)]
+    sharing: ShardArgs,
 }
 
 /// Parser of sets of slots: `1-10,12`.
@@ -164,28 +171,66 @@ struct SimulateOutput {
     flights: Vec<Flown>,
 }
 
+impl SimulateArgs {
+    /// Folder of the campaign, and the logs that the simulation makes.
+    pub(super) fn results(&self) -> Result<(PathBuf, Vec<PathBuf>), CommandError> {
+        if self.drones.is_some() {
+            return Err(CommandError::Usage(
+                "on a cluster all drones are shared out: leave --drones away".to_owned(),
+            ));
+        }
+        let mut logs = Vec::new();
+        for folder in campaign::flights(&self.campaign)? {
+            let plan = folder.read_plan()?;
+            if self.flight.as_ref().is_none_or(|name| *name == plan.name) {
+                let count = plan.slots.len();
+                logs.extend(plan.slots.iter().map(|slot| folder.simulated_log(slot.slot, count)));
+            }
+        }
+        Ok((self.campaign.clone(), logs))
+    }
+}
+
 pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, CommandError> {
     let folders = campaign::flights(&args.campaign)?;
     let vehicle = args.vehicle.as_deref().map(library::load).transpose()?;
+    let share = args.sharing.share();
     let simulation = Simulation {
         vehicle,
         only: args.drones.clone(),
+        share,
         ..args.air.simulation(args.updraft, args.force)
     };
-    let _lock = context.lock(&args.campaign)?;
-    let mut flights = Vec::new();
+    // Shards share the folder, on file systems that may have no locks.
+    let _lock = share.shard.is_none().then(|| context.lock(&args.campaign)).transpose()?;
+    let mut plans = Vec::new();
     for folder in &folders {
         let plan = folder.read_plan()?;
-        if args.flight.as_ref().is_some_and(|name| *name != plan.name) {
-            continue;
+        if args.flight.as_ref().is_none_or(|name| *name == plan.name) {
+            plans.push((folder, plan));
         }
-        flights.push(simulate(context, folder, &plan, &simulation)?);
     }
-    if flights.is_empty() {
+    if plans.is_empty() {
         let name = args.flight.as_deref().unwrap_or_default();
         return Err(CommandError::Usage(format!("the campaign has no flight \"{name}\"")));
     }
+    let plans = numbered(plans, &simulation);
+    if share.gather_only {
+        check_complete(&plans)?;
+    }
+    let mut flights = Vec::new();
+    for (folder, plan, simulation) in &plans {
+        flights.push(simulate(context, folder, plan, simulation)?);
+    }
     let failed = flights.iter().any(|flight| !flight.failed.is_empty());
+    if let Some(shard) = share.shard {
+        let sum = |of: fn(&Flown) -> usize| flights.iter().map(of).sum::<usize>();
+        let (logs, there) = (sum(|flight| flight.logs), sum(|flight| flight.kept));
+        let lost: Vec<String> =
+            flights.iter().flat_map(|flight| flight.failed.iter().cloned()).collect();
+        let done = ShardDone { shard, items: logs + lost.len(), there, lost };
+        return shard_args::report(context, &done, "log");
+    }
     if context.json {
         context.print_json(&SimulateOutput { schema: "updraft.simulate/1", flights })?;
     }

@@ -7,12 +7,13 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::shard_args::{self, ShardArgs};
 use crate::base::plain::Shown as _;
 use crate::report;
 use crate::study::result::StudyResult;
-use crate::study::{Settings, StudyPlan, Work};
+use crate::study::{Cell, Settings, StudyPlan, Work, cells_folder};
 use crate::workflow::clock::Stopwatch;
-use crate::workflow::study::{BUILT_IN, evaluated, fly, refuse_campaign, write};
+use crate::workflow::study::{BUILT_IN, evaluated, fly, join, refuse_campaign, shard_done, write};
 
 /// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
@@ -24,6 +25,7 @@ const MIN_WIDTH: usize = 60;
   updraft sweep templates/study.toml
   updraft sweep my-study.toml -o my-study --seed 7
   updraft sweep --keep-logs
+  updraft sweep large.toml -o large --shard 3/10
 
 Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and
 u0 held fixed at those of still air, and writes study.json and report/index.html. Finished flights
@@ -46,8 +48,10 @@ pub(super) struct SweepArgs {
     #[arg(long)]
     keep_logs: bool,
     /// Fly finished flights again
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["shard", "no_fly"])]
     force: bool,
+    #[command(flatten)]
+    sharing: ShardArgs,
 }
 
 /// What `--json` prints.
@@ -60,18 +64,36 @@ struct SweepOutput<'a> {
     study: &'a StudyResult,
 }
 
+impl SweepArgs {
+    /// Folder of the study, and the files of its flights.
+    pub(super) fn results(&self) -> Result<(PathBuf, Vec<PathBuf>), CommandError> {
+        let study = StudyPlan::load(&self.study)?;
+        let folder = cells_folder(&self.output);
+        let file = |cell: &Cell| folder.join(format!("{}.json", cell.name()));
+        Ok((self.output.clone(), study.cells().iter().map(file).collect()))
+    }
+}
+
 pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
     let study = StudyPlan::load(&args.study)?;
     refuse_campaign(&args.output)?;
-    let _lock = context.lock(&args.output)?;
-    let settings = Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force };
+    let share = args.sharing.share();
+    // Shards share the folder, on file systems that may have no locks.
+    let _lock = share.shard.is_none().then(|| context.lock(&args.output)).transpose()?;
+    let settings =
+        Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force, share };
     let work = Work::open(&study, &args.output, settings)?;
+    join(context, &args.output, &work, share)?;
     let (total, open) = (work.total(), work.open_flights());
     if open < total {
         context.say(&format!("{} of {total} flights are there already", total - open));
     }
     let flown = fly(context, work, "flying", args.jobs)?;
+    if let Some(shard) = share.shard {
+        let done = shard_done(context, shard, total, &flown);
+        return shard_args::report(context, &done, "flight");
+    }
     let flying = watch.to_string();
     let result = evaluated(context, &study, args.seed, &flown)?;
     if !context.json {

@@ -13,6 +13,7 @@ use crate::blind::seal::Sealed;
 use crate::blind::series::FlightResult;
 use crate::blind::table::Table;
 use crate::blind::told::HiddenRun;
+use crate::campaign::items::ItemsRecord;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
 use crate::fleet::changes::Changes;
@@ -24,6 +25,8 @@ use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
+use crate::workflow::analyze::each::AnalysisRecord;
+use crate::workflow::cluster::{ClusterRecord, Status};
 use crate::workflow::fleet::output::FlyOutput;
 use crate::workflow::fleet::preflight::PreflightOutput;
 use crate::workflow::game::verify::Verification;
@@ -90,6 +93,14 @@ pub enum Format {
     Next,
     /// hidden.json of `updraft run --hide`
     Hidden,
+    /// items.json of a folder whose items can be shared out
+    Items,
+    /// analysis-record.json of `updraft analyze --each`
+    AnalysisRecord,
+    /// cluster/job.json of `updraft cluster submit`
+    Cluster,
+    /// what `updraft cluster status --json` prints
+    ClusterStatus,
 }
 
 impl Format {
@@ -118,6 +129,10 @@ impl Format {
             Self::BlindVerify => schema_for!(Verification),
             Self::Next => schema_for!(Next),
             Self::Hidden => schema_for!(HiddenRun),
+            Self::Items => schema_for!(ItemsRecord),
+            Self::AnalysisRecord => schema_for!(AnalysisRecord),
+            Self::Cluster => schema_for!(ClusterRecord),
+            Self::ClusterStatus => schema_for!(Status),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

@@ -5,13 +5,14 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::cell::Cell;
+use super::cell::{Cell, Condition};
 use super::error::StudyError;
 use super::fly::{CELL_SCHEMA, CellLog, CellRecord, FlyError, fly_cell};
 use super::template::StudyPlan;
 use crate::base::digest::sha256;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::parse;
+use crate::base::shard::Share;
 use crate::sim::SimError;
 
 /// Largest record that is read back, bytes.
@@ -26,6 +27,15 @@ pub struct Settings {
     pub keep_logs: bool,
     /// Whether finished flights are flown again.
     pub force: bool,
+    /// Which flights are looked at.
+    pub share: Share,
+}
+
+impl Settings {
+    /// Settings for all flights of a study with this seed; logs are not kept.
+    pub fn new(seed: u64) -> Self {
+        Self { seed, ..Self::default() }
+    }
 }
 
 /// A flight that could not be flown or read.
@@ -40,7 +50,7 @@ pub struct Lost {
 /// Flights of a study: finished and lost ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flown {
-    /// Record of each cell of the study, in its order; `None` for a lost flight.
+    /// Record of each cell that was looked at, in the study's order; `None` for a lost flight.
     pub records: Vec<Option<CellRecord>>,
     /// Flights that failed, with their reasons.
     pub lost: Vec<Lost>,
@@ -92,7 +102,9 @@ impl<'a> Work<'a> {
         if logs_folder(folder).is_dir() {
             sweep_partial(&logs_folder(folder))?;
         }
-        let cells = study.cells();
+        let mut cells = study.cells();
+        let mut item = 0..;
+        cells.retain(|_| item.next().is_some_and(|item| settings.share.takes(item)));
         let cells = cells
             .into_par_iter()
             .map(|cell| {
@@ -106,7 +118,7 @@ impl<'a> Work<'a> {
         Ok(Self { study, folder, settings, cells })
     }
 
-    /// Number of flights of the study.
+    /// Number of flights that are looked at: of the study, or of a share of it.
     pub fn total(&self) -> usize {
         self.cells.len()
     }
@@ -114,6 +126,27 @@ impl<'a> Work<'a> {
     /// Number of flights that are not finished.
     pub fn open_flights(&self) -> usize {
         self.cells.iter().filter(|item| item.record.is_none()).count()
+    }
+
+    /// SHA-256 of what all flights of the study have in common, hexadecimal.
+    ///
+    /// # Errors
+    /// [`StudyError::Record`] if the settings have no form as JSON.
+    pub fn sha256(&self) -> Result<String, StudyError> {
+        // The key of a cell has all of it, and its air beside.
+        let reference = Cell { condition: Condition::STILL, updraft_mps: 0.0 };
+        reference
+            .key(self.study, self.settings.seed)
+            .map_err(|source| StudyError::Record { cell: reference.name(), source })
+    }
+
+    /// Names of the flights that are not finished.
+    pub fn missing(&self) -> Vec<String> {
+        self.cells
+            .iter()
+            .filter(|item| item.record.is_none())
+            .map(|item| item.cell.name())
+            .collect()
     }
 
     /// Flies the open cells on all threads of the current pool; a flight that fails is lost and
@@ -203,7 +236,13 @@ fn keep(
         });
     } else if path.exists() {
         // It belongs to other settings.
-        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(FileError::new("remove", &path, error).into());
+            }
+            // A peer that flies the same was first.
+            _ => {}
+        }
     }
     let mut json = serde_json::to_vec(record)
         .map_err(|source| StudyError::Record { cell: cell.name(), source })?;

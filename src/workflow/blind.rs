@@ -7,12 +7,16 @@ use super::error::{WorkflowError, with_reasons};
 use super::gap::search::Searched;
 use super::host::Host;
 use super::made_by;
+use super::share::{ShardDone, numbers, on_threads};
 use crate::base::file::write_whole;
+use crate::base::shard::Share;
 use crate::blind::render::{Style, render};
-use crate::blind::series::{self, Place, Settings};
+use crate::blind::score::Outcome;
+use crate::blind::series::{self, Place, Settings, Taken};
 use crate::blind::table::{Table, table};
 use crate::blind::tables::{FIRST_OF_PAIRS, FOREIGN_KINDS, KINDS, TOGETHER};
 use crate::blind::{Base, BlindError, Worlds};
+use crate::campaign::items::{self, ItemsRecord};
 use crate::campaign::to_json;
 
 /// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
@@ -57,58 +61,101 @@ impl Scored {
     }
 }
 
-/// Flies a series, `jobs` flights at the same time (`None`: one per core), and writes its table.
-/// `note` goes into the table's head. Finished flights are kept.
+/// Outcome of a run of a series.
+pub enum Ran {
+    /// All flights were looked at, and their table was written.
+    Table(Box<Scored>),
+    /// A shard's flights were flown; the table comes from a run without a shard.
+    Shard(ShardDone),
+}
+
+/// Flies a series, `jobs` flights at the same time (`None`: one per core), and writes its table; of a
+/// shard, only its flights. `note` goes into the table's head. Finished flights are kept.
 ///
 /// # Errors
-/// When the seed is not for this, the folder cannot be written, or no flight has a verdict.
+/// When the seed is not for this, the folder cannot be written or has flights of other settings, no flight
+/// has a verdict, or, where missing flights are only to be named, one is missing.
 pub fn run(
     host: &dyn Host,
     settings: &Settings,
     place: &Place,
+    share: Share,
     jobs: Option<u16>,
     note: Option<&str>,
-) -> Result<Scored, WorkflowError> {
+) -> Result<Ran, WorkflowError> {
     settings.check_seed()?;
-    let _lock = host.lock(&place.folder)?;
-    let progress = host.progress("blind flights", settings.flights as u64);
+    settings.cells()?;
+    // Shards share the folder, on file systems that may have no locks.
+    let _lock = share.shard.is_none().then(|| host.lock(&place.folder)).transpose()?;
+    let record =
+        ItemsRecord::new(made_by(), "blind flights", settings.flight_sha256()?, host.command());
+    items::join(&place.folder, &record)?;
+    let count = share.count(settings.flights);
+    let progress = host.progress("blind flights", count as u64);
     let work = || {
-        series::run(settings, place, &made_by(), &Searched, host.stop_flag(), &|| {
+        series::run(settings, place, share, &made_by(), &Searched, host.stop_flag(), &|| {
             progress.advance();
         })
     };
-    let results = match jobs {
-        Some(jobs) => rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(jobs))
-            .build()
-            .map_err(|error| WorkflowError::Failed(format!("failed to start threads: {error}")))?
-            .install(work),
-        None => work(),
-    };
+    let taken = on_threads(jobs, work)?;
     progress.finish();
-    let mut outcomes = Vec::new();
-    let mut lost = Vec::new();
-    for (index, result) in results?.into_iter().enumerate() {
-        match result {
-            Ok(result) => outcomes.push(result.outcome),
-            Err(BlindError::Stopped) => return Err(WorkflowError::Interrupted),
-            Err(error) => {
-                let reason = with_reasons(&WorkflowError::from(error));
-                lost.push(format!("flight {index}: {reason}"));
-            }
-        }
+    let sorted = sort(taken?)?;
+    if !sorted.missing.is_empty() {
+        let missing = numbers(&sorted.missing);
+        return Err(WorkflowError::Missing {
+            what: "blind flights",
+            count: sorted.missing.len(),
+            of: count,
+            missing,
+        });
     }
-    for reason in &lost {
+    for reason in &sorted.lost {
         host.warn(reason);
     }
-    if outcomes.is_empty() {
+    if let Some(shard) = share.shard {
+        let Sorted { there, lost, .. } = sorted;
+        return Ok(Ran::Shard(ShardDone { shard, items: count, there, lost }));
+    }
+    if sorted.outcomes.is_empty() {
         return Err(WorkflowError::Nothing("no flight has a verdict".to_owned()));
     }
-    let table = table(settings, &outcomes, lost.len(), &made_by());
+    let table = table(settings, &sorted.outcomes, sorted.lost.len(), &made_by());
     let json = to_json(&table)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
     let markdown = place.folder.join("table.md");
     write_whole(&place.folder.join("table.json"), &json)?;
     write_whole(&markdown, render(&table, Style::Markdown, note).as_bytes())?;
-    Ok(Scored { table, markdown, flights: outcomes.len(), lost })
+    let flights = sorted.outcomes.len();
+    Ok(Ran::Table(Box::new(Scored { table, markdown, flights, lost: sorted.lost })))
+}
+
+/// Flights by what became of them.
+#[derive(Default)]
+struct Sorted {
+    outcomes: Vec<Outcome>,
+    /// Number of those that were finished before.
+    there: usize,
+    /// Reasons why flights have no verdict, one sentence each.
+    lost: Vec<String>,
+    /// Places in the table of those that were not to be flown.
+    missing: Vec<usize>,
+}
+
+fn sort(taken: Vec<Taken>) -> Result<Sorted, WorkflowError> {
+    let mut sorted = Sorted::default();
+    for Taken { index, result, was_there } in taken {
+        match result {
+            Ok(result) => {
+                sorted.outcomes.push(result.outcome);
+                sorted.there += usize::from(was_there);
+            }
+            Err(BlindError::Stopped) => return Err(WorkflowError::Interrupted),
+            Err(BlindError::NotFlown { .. }) => sorted.missing.push(index),
+            Err(error) => {
+                let reason = with_reasons(&WorkflowError::from(error));
+                sorted.lost.push(format!("flight {index}: {reason}"));
+            }
+        }
+    }
+    Ok(sorted)
 }

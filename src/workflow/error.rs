@@ -84,6 +84,21 @@ pub enum WorkflowError {
     /// There is nothing to work on; a sentence for people.
     #[error("{0}")]
     Nothing(String),
+    /// Items that others should have made are not there, and nothing was to be made.
+    #[error(
+        "{count} of {of} {what} missing: {missing}\nrun the same command without --no-fly to make them, or with \
+         --shard to share them out"
+    )]
+    Missing {
+        /// Kind of the items, a plural: "blind flights".
+        what: &'static str,
+        /// Number of missing items.
+        count: usize,
+        /// Number of items that were looked for.
+        of: usize,
+        /// Names of all missing items.
+        missing: String,
+    },
     /// The work was stopped from outside.
     #[error("interrupted; run the same command again to resume")]
     Interrupted,

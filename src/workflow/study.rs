@@ -6,8 +6,11 @@ use super::clock::Stopwatch;
 use super::error::WorkflowError;
 use super::host::Host;
 use super::made_by;
+use super::share::{ShardDone, on_threads};
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
+use crate::base::shard::{Shard, Share};
+use crate::campaign::items::{self, ItemsRecord};
 use crate::campaign::{self, to_json};
 use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
@@ -28,19 +31,46 @@ pub fn fly(
     jobs: Option<u16>,
 ) -> Result<Flown, WorkflowError> {
     let progress = host.progress(doing, work.open_flights() as u64);
-    let fly = || work.fly(host.stop_flag(), &|| progress.advance());
-    let flown = match jobs {
-        Some(jobs) => rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(jobs))
-            .build()
-            .map_err(|error| WorkflowError::Failed(format!("failed to start threads: {error}")))?
-            .install(fly),
-        None => fly(),
-    };
+    let flown = on_threads(jobs, || work.fly(host.stop_flag(), &|| progress.advance()))?;
     progress.finish();
     let flown = flown?;
     host.check_stop()?;
     Ok(flown)
+}
+
+/// Takes a study's folder for the flights of `work`, or joins the processes that have taken it. Without a
+/// shard the folder is locked, and a changed study takes it over: its flights each know their settings.
+///
+/// # Errors
+///
+/// If the folder has flights of other settings or another version, or, where missing flights are only to be
+/// named, one is missing.
+pub fn join(
+    host: &dyn Host,
+    folder: &Path,
+    work: &Work<'_>,
+    share: Share,
+) -> Result<(), WorkflowError> {
+    let record = ItemsRecord::new(made_by(), "cells of a study", work.sha256()?, host.command());
+    match share.shard {
+        Some(_) => items::join(folder, &record)?,
+        None => items::take_over(folder, &record)?,
+    }
+    let missing = if share.gather_only { work.missing() } else { Vec::new() };
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let (count, missing) = (missing.len(), missing.join(", "));
+    Err(WorkflowError::Missing { what: "cells of the study", count, of: work.total(), missing })
+}
+
+/// Outcome of a shard of a study.
+pub fn shard_done(host: &dyn Host, shard: Shard, items: usize, flown: &Flown) -> ShardDone {
+    let lost: Vec<String> = flown.lost.iter().map(|lost| lost.reason.clone()).collect();
+    for reason in &lost {
+        host.warn(reason);
+    }
+    ShardDone { shard, items, there: items - flown.flown, lost }
 }
 
 /// Evaluates a study, and reports the flights that were lost to the host.
@@ -69,7 +99,7 @@ pub fn evaluated(
 pub fn fly_built_in(host: &dyn Host, folder: &Path, seed: u64) -> Result<(), WorkflowError> {
     let watch = Stopwatch::start(host);
     let study = StudyPlan::load(BUILT_IN)?;
-    let work = Work::open(&study, folder, Settings { seed, keep_logs: false, force: false })?;
+    let work = Work::open(&study, folder, Settings::new(seed))?;
     let flown = fly(host, work, "flying the study", None)?;
     let result = evaluated(host, &study, seed, &flown)?;
     write(folder, format!("updraft run --seed {seed}"), seed, &result)?;

@@ -7,6 +7,7 @@ mod blind;
 mod campaign;
 mod check;
 mod cli;
+mod cluster;
 mod effects;
 mod firmware;
 mod fleet;

@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
+use crate::owner;
 use crate::plain::Shown as _;
 
-/// Prefix of the names of unfinished files, by which a later step recognises and sweeps them.
+/// Prefix of the names of unfinished files, by which a later step recognises and sweeps them; the
+/// [`mark`](crate::owner::mark) of the process that writes follows.
 pub const PARTIAL_PREFIX: &str = ".partial-";
 
 /// A file could not be read or written.
@@ -67,26 +69,68 @@ pub fn write_private(path: &Path, content: &[u8]) -> Result<(), FileError> {
 }
 
 /// `mode`: who may do what with it, where files have modes.
-#[cfg_attr(not(unix), expect(unused_variables, reason = "files have no modes there"))]
 fn write_as(
     path: &Path,
     mode: u32,
     fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
 ) -> Result<(), FileError> {
-    let folder = match path.parent() {
+    let temporary = filled(path, mode, fill)?;
+    let fail = |source| FileError::new("write", path, source);
+    temporary.persist(path).map_err(|error| fail(error.error))?;
+    sync_folder(path);
+    Ok(())
+}
+
+/// Writes a whole file unless there is one; returns whether it was written. Of several processes that
+/// try at the same time, one succeeds.
+///
+/// # Errors
+///
+/// If the folder or the file cannot be written.
+pub fn write_new(path: &Path, content: &[u8]) -> Result<bool, FileError> {
+    let temporary = filled(path, 0o644, |out| out.write_all(content))?;
+    match temporary.persist_noclobber(path) {
+        Ok(_) => {
+            sync_folder(path);
+            Ok(true)
+        }
+        Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+        Err(error) => Err(FileError::new("write", path, error.error)),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
+    }
+}
+
+/// A rename is durable only once the folder is on disk; not every file system allows it.
+fn sync_folder(path: &Path) {
+    if let Ok(folder) = File::open(folder_of(path)) {
+        let _ = folder.sync_all();
+    }
+}
+
+/// The temporary file that becomes `path`, written and flushed to disk.
+#[cfg_attr(not(unix), expect(unused_variables, reason = "files have no modes there"))]
+fn filled(
+    path: &Path,
+    mode: u32,
+    fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<NamedTempFile, FileError> {
+    let folder = folder_of(path);
     create_folder(folder)?;
     let fail = |source| FileError::new("write", path, source);
+    let prefix = format!("{PARTIAL_PREFIX}{}-", owner::mark());
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(mode));
     }
-    let mut temporary: NamedTempFile =
-        builder.prefix(PARTIAL_PREFIX).tempfile_in(folder).map_err(fail)?;
+    let mut temporary: NamedTempFile = builder.prefix(&prefix).tempfile_in(folder).map_err(fail)?;
     // As long as it is locked, nobody sweeps it. Where it cannot be, the folder's lock must do.
     let _ = temporary.as_file().try_lock();
     {
@@ -94,12 +138,7 @@ fn write_as(
         fill(&mut out).and_then(|()| out.flush()).map_err(fail)?;
     }
     temporary.as_file().sync_all().map_err(fail)?;
-    temporary.persist(path).map_err(|error| fail(error.error))?;
-    // The rename itself is durable only once the folder is on disk; not every file system allows it.
-    if let Ok(folder) = File::open(folder) {
-        let _ = folder.sync_all();
-    }
-    Ok(())
+    Ok(temporary)
 }
 
 /// Creates a folder and its parents, if they do not exist.
@@ -203,7 +242,8 @@ pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, Fil
 }
 
 /// Removes the temporary files that a killed run left in `folder` (not in its subfolders) and
-/// returns their number; files that are still being written stay.
+/// returns their number. Files that are still being written stay: those that are locked, those of a
+/// process that runs, and those of other machines, whose processes nobody here can see.
 ///
 /// # Errors
 ///
@@ -214,8 +254,11 @@ pub fn sweep_partial(folder: &Path) -> Result<usize, FileError> {
     for entry in fs::read_dir(folder).map_err(fail)? {
         let entry = entry.map_err(fail)?;
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
         if is_file
-            && entry.file_name().to_string_lossy().starts_with(PARTIAL_PREFIX)
+            && name.starts_with(PARTIAL_PREFIX)
+            && owner::may_run(&name, PARTIAL_PREFIX) != Some(true)
             && !is_being_written(&entry.path())
         {
             match fs::remove_file(entry.path()) {
@@ -279,6 +322,41 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("a.txt"));
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn of_several_writers_one_is_the_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("record.json");
+        let first = std::thread::scope(|scope| {
+            let write = |text: u8| {
+                scope.spawn({
+                    let path = &path;
+                    move || write_new(path, &[text]).unwrap()
+                })
+            };
+            let writers: Vec<_> = (0..8).map(write).collect();
+            writers
+                .into_iter()
+                .filter_map(|writer| writer.join().ok())
+                .filter(|first| *first)
+                .count()
+        });
+        assert_eq!(first, 1);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn files_of_other_machines_and_of_running_processes_are_not_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mine = format!("{PARTIAL_PREFIX}{}-abc", owner::mark());
+        let theirs = format!("{PARTIAL_PREFIX}node7-01234567-1-abc");
+        let ended = mine.replace(&format!("-{}-", std::process::id()), "-2147483646-");
+        for name in [&mine, &theirs, &ended] {
+            fs::write(folder.path().join(name), b"half").unwrap();
+        }
+        assert_eq!(sweep_partial(folder.path()).unwrap(), 1);
+        assert!(folder.path().join(mine).exists() && folder.path().join(theirs).exists());
     }
 
     #[test]

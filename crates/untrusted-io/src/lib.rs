@@ -3,6 +3,7 @@
 pub mod crc;
 pub mod file;
 pub mod number;
+pub mod owner;
 #[cfg(feature = "parse")]
 pub mod parse;
 pub mod plain;

@@ -17,8 +17,9 @@ use crate::blind::tables::{FOREIGN_KINDS, KINDS, ON_REQUEST};
 use crate::blind::{AirClass, Base, Protocol, Worlds};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
+use crate::cli::shard_args::{self, ShardArgs};
 use crate::cli::words;
-use crate::workflow::blind;
+use crate::workflow::blind::{self, Ran};
 
 /// The word for nothing.
 const NONE: &str = "none";
@@ -43,6 +44,7 @@ enum Which {
   updraft blind --seed 20270101 --flights 3000 -o blind
   updraft blind --seed 20270102 --protocol paper --effects none --air field --flights 200
   updraft blind --seed 20270103 --effects battery,rotor-inflow+battery --base airsim --keep
+  updraft blind --seed 20270101 --flights 3000 -o blind --shard 3/10
   updraft blind hide -o game                      # a game: then updraft gap game, blind reveal game
 
 Each flight is drawn from the seed, its truth is sealed (the SHA-256 is published before the flight),
@@ -61,6 +63,13 @@ In foreign worlds (--worlds foreign), where the base airsim is a thrust law and 
 pub(super) struct BlindArgs {
     #[command(subcommand)]
     command: Option<BlindCommand>,
+    #[command(flatten)]
+    series: SeriesArgs,
+}
+
+/// Arguments of a series of blind flights.
+#[derive(Debug, Args)]
+pub(super) struct SeriesArgs {
     /// Whose physics to fly with, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "home")]
     worlds: Vec<WorldsWord>,
@@ -105,6 +114,11 @@ pub(super) struct BlindArgs {
     /// Flights at the same time [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    /// Folder to fly in, best on a disk of this machine alone [default: work/ in the table's folder]
+    #[arg(long, value_name = "FOLDER")]
+    scratch: Option<PathBuf>,
+    #[command(flatten)]
+    sharing: ShardArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -187,7 +201,20 @@ fn foreign_kinds_text() -> String {
     })
 }
 
-impl BlindArgs {
+impl SeriesArgs {
+    /// The folder of the table, and its number of flights, after a look at the arguments.
+    pub(super) fn results(&self) -> Result<(PathBuf, usize), CommandError> {
+        let settings = self.settings();
+        settings.check_seed()?;
+        settings.cells()?;
+        Ok((self.output.clone(), settings.flights))
+    }
+
+    /// Whether the folder to fly in was chosen.
+    pub(super) fn has_scratch(&self) -> bool {
+        self.scratch.is_some()
+    }
+
     fn settings(&self) -> Settings {
         let protocols = match self.protocol {
             Which::Paper => vec![Protocol::Paper],
@@ -240,9 +267,14 @@ pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandEr
         Some(BlindCommand::Verify(args)) => return verify::run(context, args),
         None => {}
     }
-    let place = Place { folder: args.output.clone(), keep: args.keep };
-    let note = args.note.as_deref();
-    let scored = blind::run(context, &args.settings(), &place, args.jobs, note)?;
+    let args = &args.series;
+    let (folder, keep, scratch) = (args.output.clone(), args.keep, args.scratch.clone());
+    let place = Place { folder, keep, scratch };
+    let (note, share) = (args.note.as_deref(), args.sharing.share());
+    let scored = match blind::run(context, &args.settings(), &place, share, args.jobs, note)? {
+        Ran::Table(scored) => scored,
+        Ran::Shard(done) => return shard_args::report(context, &done, "blind flight"),
+    };
     if context.json {
         context.print_json(&scored.table)?;
     } else {

@@ -3,6 +3,7 @@
 //! [`gather()`] finds what is to be analysed, [`Analysing`] does it step by step, [`Analysed`] is what
 //! came of it; [`analyze_campaign`] is all of it for one campaign.
 
+pub mod each;
 mod fields;
 mod gather;
 mod held;

@@ -11,9 +11,11 @@ use self::record::{changed_logs, prepare, taken_down, write_record};
 use super::clock::Stopwatch;
 use super::error::{WorkflowError, with_reasons};
 use super::host::Host;
+use super::share::numbers;
 use super::slots::SlotSet;
 use super::words;
 use crate::base::plain::Shown as _;
+use crate::base::shard::Share;
 use crate::campaign::{FlightFolder, FlightRecord};
 use crate::effects;
 use crate::mission::Plan;
@@ -46,6 +48,11 @@ pub struct Simulation {
     pub only: Option<SlotSet>,
     /// Whether logs that were flown with other settings are replaced.
     pub force: bool,
+    /// Which of these slots are looked at by this process.
+    pub share: Share,
+    /// Number of the flight's first slot among the items that are shared out: slots of all flights are
+    /// counted on.
+    pub first_item: usize,
 }
 
 impl Simulation {
@@ -60,6 +67,8 @@ impl Simulation {
             vehicle: None,
             only: None,
             force: false,
+            share: Share::default(),
+            first_item: 0,
         }
     }
 }
@@ -117,6 +126,7 @@ pub(crate) struct Ready<'a> {
     /// Those of them that have no log yet.
     pub(crate) open: Vec<&'a Slot>,
     pub(crate) air: air::Sum,
+    share: Share,
 }
 
 /// Resolves a flight's vehicle and air, and finds what is still to be flown. Logs that are there and
@@ -137,11 +147,7 @@ pub(crate) fn make_ready<'a>(
     }
     let mut record = prepare(folder, plan, simulation, &vehicle)?;
     let count = plan.slots.len();
-    let wanted: Vec<_> = plan
-        .slots
-        .iter()
-        .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.contains(slot.slot)))
-        .collect();
+    let wanted = wanted(plan, simulation);
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {
         let path = folder.simulated_log(*slot, count);
@@ -152,6 +158,10 @@ pub(crate) fn make_ready<'a>(
         changed.contains_key(&slot.slot) || !folder.simulated_log(slot.slot, count).exists()
     };
     let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
+    if simulation.share.gather_only && !open.is_empty() {
+        let slots = open.iter().map(|slot| slot.slot.into()).collect();
+        return Err(missing(&[(plan.name.clone(), slots)], wanted.len()));
+    }
     let frame = plan.site.frame();
     let air = air::spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
     if simulation.truth {
@@ -160,7 +170,60 @@ pub(crate) fn make_ready<'a>(
             air::truth::write(&path, &air, &plan.trajectory(slot), slot.slot, &frame)
         })?;
     }
-    Ok(Ready { vehicle, record, wanted, open, air })
+    Ok(Ready { vehicle, record, wanted, open, air, share: simulation.share })
+}
+
+/// The slots of one flight that are asked for.
+fn wanted<'a>(plan: &'a Plan, simulation: &Simulation) -> Vec<&'a Slot> {
+    let is_wanted = |slot: &&Slot| {
+        let is_asked_for = simulation.only.as_ref().is_none_or(|set| set.contains(slot.slot));
+        let item = simulation.first_item + usize::from(slot.slot) - 1;
+        is_asked_for && simulation.share.takes(item)
+    };
+    plan.slots.iter().filter(is_wanted).collect()
+}
+
+/// Each flight with its slots counted on from those before it.
+pub fn numbered<'a>(
+    flights: Vec<(&'a FlightFolder, Plan)>,
+    simulation: &Simulation,
+) -> Vec<(&'a FlightFolder, Plan, Simulation)> {
+    let mut first_item = 0;
+    let number = |(folder, plan): (&'a FlightFolder, Plan)| {
+        let slots = plan.slots.len();
+        let numbered = (folder, plan, Simulation { first_item, ..simulation.clone() });
+        first_item += slots;
+        numbered
+    };
+    flights.into_iter().map(number).collect()
+}
+
+/// Ends the work if a log of these flights is missing, and names all that are.
+///
+/// # Errors
+///
+/// [`WorkflowError::Missing`].
+pub fn check_complete(flights: &[(&FlightFolder, Plan, Simulation)]) -> Result<(), WorkflowError> {
+    let (mut absent, mut of) = (Vec::new(), 0);
+    for (folder, plan, simulation) in flights {
+        let wanted = wanted(plan, simulation);
+        of += wanted.len();
+        let is_absent = |slot: &&&Slot| !folder.simulated_log(slot.slot, plan.slots.len()).exists();
+        let slots: Vec<usize> =
+            wanted.iter().filter(is_absent).map(|slot| slot.slot.into()).collect();
+        if !slots.is_empty() {
+            absent.push((plan.name.clone(), slots));
+        }
+    }
+    if absent.is_empty() { Ok(()) } else { Err(missing(&absent, of)) }
+}
+
+/// Error that names missing slots, flight by flight.
+fn missing(absent: &[(String, Vec<usize>)], of: usize) -> WorkflowError {
+    let count = absent.iter().map(|(_, slots)| slots.len()).sum();
+    let words = |(flight, slots): &(String, Vec<usize>)| format!("{flight} {}", numbers(slots));
+    let missing = absent.iter().map(words).collect::<Vec<_>>().join("; ");
+    WorkflowError::Missing { what: "logs", count, of, missing }
 }
 
 /// Flies one flight in the simulator, a drone on each processor; existing logs that fit are kept.
@@ -273,12 +336,18 @@ pub(crate) fn settle(
     failed: Vec<String>,
     watch: &Stopwatch,
 ) -> Result<Flown, WorkflowError> {
-    let Ready { mut record, wanted, open, .. } = ready;
-    record.logs = taken_down(folder, plan, &record, &open)?;
-    write_record(folder, &record)?;
+    let Ready { mut record, wanted, open, share, .. } = ready;
+    let bytes = if share.shard.is_none() {
+        record.logs = taken_down(folder, plan, &record, &open)?;
+        write_record(folder, &record)?;
+        record.logs.iter().map(|log| log.bytes).sum()
+    } else {
+        // What shards leave is entered by the run that puts them together.
+        let paths = wanted.iter().map(|slot| folder.simulated_log(slot.slot, plan.slots.len()));
+        paths.filter_map(|path| std::fs::metadata(path).ok()).map(|found| found.len()).sum()
+    };
     host.check_stop()?;
     let kept = wanted.len() - open.len();
-    let bytes = record.logs.iter().map(|log| log.bytes).sum();
     for error in &failed {
         host.warn(error);
     }

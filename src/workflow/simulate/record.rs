@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use super::Simulation;
 use crate::base::digest::sha256;
-use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
+use crate::base::file::{
+    FileError, create_folder, read_whole, sweep_partial, write_new, write_whole,
+};
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
@@ -53,6 +55,15 @@ pub(super) fn prepare(
     };
     create_folder(&folder.simulated())?;
     sweep_partial(&folder.simulated())?;
+    let is_shard = simulation.share.shard.is_some();
+    // Of several shards that begin, one takes the folder; the others find its record.
+    if is_shard
+        && !folder.record().exists()
+        && present_logs(folder, plan).is_empty()
+        && write_new(&folder.record(), &record_bytes(&record)?)?
+    {
+        return Ok(record);
+    }
     match folder.read_record()? {
         Some(existing) if existing.source != record.source => {
             return Err(WorkflowError::Usage(format!(
@@ -84,7 +95,9 @@ pub(super) fn prepare(
         }
         None => {}
     }
-    write_record(folder, &record)?;
+    if !is_shard {
+        write_record(folder, &record)?;
+    }
     Ok(record)
 }
 
@@ -168,7 +181,10 @@ pub(super) fn write_record(
     folder: &FlightFolder,
     record: &FlightRecord,
 ) -> Result<(), WorkflowError> {
-    let json = to_json(record)
-        .map_err(|error| WorkflowError::Failed(format!("failed to make the record: {error}")))?;
-    Ok(write_whole(&folder.record(), &json)?)
+    Ok(write_whole(&folder.record(), &record_bytes(record)?)?)
+}
+
+fn record_bytes(record: &FlightRecord) -> Result<Vec<u8>, WorkflowError> {
+    to_json(record)
+        .map_err(|error| WorkflowError::Failed(format!("failed to make the record: {error}")))
 }

@@ -5,14 +5,15 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use updraft::base::shard::Share;
 use updraft::blind::explain::Cause;
 use updraft::blind::render::{Style, render};
 use updraft::blind::score::{Called, Outcome, score};
-use updraft::blind::seal;
-use updraft::blind::series::{FIRST_SCORING_SEED, Place, Settings, run};
+use updraft::blind::series::{FIRST_SCORING_SEED, FlightResult, Place, Settings};
 use updraft::blind::table::table;
 use updraft::blind::told::{is_right, words};
 use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario, Worlds};
+use updraft::blind::{seal, series};
 use updraft::gap::verdict::{
     Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
 };
@@ -312,20 +313,113 @@ impl Explain for Always<'_> {
     }
 }
 
+/// What became of each flight of a share.
+fn run(
+    settings: &Settings,
+    place: &Place,
+    share: Share,
+    made_by: &str,
+    search: &dyn Explain,
+) -> Result<Vec<Result<FlightResult, BlindError>>, BlindError> {
+    let stop = AtomicBool::new(false);
+    let taken = series::run(settings, place, share, made_by, search, &stop, &|| {})?;
+    Ok(taken.into_iter().map(|taken| taken.result).collect())
+}
+
+fn place(folder: &Path, keep: bool) -> Place {
+    Place { folder: folder.to_owned(), keep, scratch: None }
+}
+
+fn share(shard: &str) -> Share {
+    Share { shard: Some(shard.parse().unwrap()), gather_only: false }
+}
+
+#[test]
+fn shards_make_the_table_that_one_process_makes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, many) = (folder.path().join("one"), folder.path().join("many"));
+    let settings = settings(4, true);
+    let asked = AtomicUsize::new(0);
+    let search = Always(&asked);
+    run(&settings, &place(&one, false), Share::default(), "updraft", &search).unwrap();
+    let many_place = Place { scratch: Some(folder.path().join("scratch")), ..place(&many, true) };
+    let gather = Share { shard: None, gather_only: true };
+    for (shard, left) in [("2/2", 2), ("1/2", 0)] {
+        run(&settings, &many_place, share(shard), "updraft", &search).unwrap();
+        let all = run(&settings, &many_place, gather, "updraft", &search).unwrap();
+        let is_missing = |one: &&Result<_, _>| matches!(one, Err(BlindError::NotFlown { .. }));
+        assert_eq!(all.iter().filter(is_missing).count(), left);
+    }
+    assert_eq!(asked.load(Ordering::SeqCst), 8);
+    for index in 0..4 {
+        let file = format!("flights/{index:05}.json");
+        let bytes = |folder: &Path| std::fs::read(folder.join(&file)).unwrap();
+        assert_eq!(bytes(&one), bytes(&many), "{file}");
+        assert!(many_place.work(index).join("verdict.json").exists());
+    }
+    assert_eq!(std::fs::read_dir(folder.path().join("scratch")).unwrap().count(), 0);
+    let newer = run(&settings, &many_place, gather, "updraft 9", &search).unwrap_err().to_string();
+    assert!(newer.contains("was made by updraft, this is updraft 9"), "{newer}");
+}
+
+/// Takes its time, so that copies of a flight meet.
+struct Slow;
+
+impl Explain for Slow {
+    fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        assert!(flight.join("plan.json").exists(), "another copy has removed this one's");
+        Ok(verdict(vec![plain("rotor-inflow")]))
+    }
+
+    fn fisher_z(&self, _flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
+        vec![Some(7.0); truth.hidden.len()]
+    }
+}
+
+/// Three copies of a shard are at the same flights, each in a folder of its own.
+#[test]
+fn copies_of_a_flight_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(2, true);
+    let places: Vec<Place> = ["a", "b", "c"]
+        .map(|scratch| Place {
+            scratch: Some(folder.path().join(scratch)),
+            ..place(&folder.path().join("table"), true)
+        })
+        .into();
+    let all = std::thread::scope(|scope| {
+        let run = |place| scope.spawn(|| run(&settings, place, Share::default(), "updraft", &Slow));
+        let copies: Vec<_> = places.iter().map(run).collect();
+        copies.into_iter().map(|copy| copy.join().unwrap().unwrap()).collect::<Vec<_>>()
+    });
+    let results = |copy: &Vec<Result<FlightResult, BlindError>>| {
+        copy.iter().map(|one| one.as_ref().unwrap().clone()).collect::<Vec<_>>()
+    };
+    assert!(all.iter().all(|copy| results(copy) == results(&all[0])));
+    for index in 0..2 {
+        assert!(places[0].work(index).join("verdict.json").exists());
+    }
+    for place in &places {
+        let scratch = place.scratch.as_ref().unwrap();
+        assert_eq!(std::fs::read_dir(scratch).unwrap().count(), 0);
+    }
+}
+
 #[test]
 fn a_table_goes_on_where_it_was_interrupted() {
     let folder = tempfile::tempdir().unwrap();
-    let place = Place { folder: folder.path().to_owned(), keep: false };
+    let place = place(folder.path(), false);
     let settings = settings(3, true);
-    let (asked, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let asked = AtomicUsize::new(0);
     let search = Always(&asked);
-    let first = run(&settings, &place, "updraft", &search, &stop, &|| {}).unwrap();
+    let first = run(&settings, &place, Share::default(), "updraft", &search).unwrap();
     let first: Vec<_> = first.into_iter().map(Result::unwrap).collect();
     assert_eq!(asked.load(Ordering::SeqCst), 3);
     assert!(!place.work(0).exists(), "flights that are scored are removed");
 
     std::fs::remove_file(folder.path().join("flights/00001.json")).unwrap();
-    let again = run(&settings, &place, "updraft", &search, &stop, &|| {}).unwrap();
+    let again = run(&settings, &place, Share::default(), "updraft", &search).unwrap();
     let again: Vec<_> = again.into_iter().map(Result::unwrap).collect();
     assert_eq!(asked.load(Ordering::SeqCst), 4);
     assert_eq!(first, again);
@@ -340,18 +434,18 @@ fn a_table_goes_on_where_it_was_interrupted() {
     assert!(render(&made, Style::Markdown, None).contains("| rotor-inflow |"));
 
     let other = Settings { seed: 4, ..settings };
-    let refused = run(&other, &place, "updraft", &search, &stop, &|| {}).unwrap_err().to_string();
+    let refused =
+        run(&other, &place, Share::default(), "updraft", &search).unwrap_err().to_string();
     assert!(refused.contains("flight 0 of another table"), "{refused}");
 }
 
 #[test]
 fn a_search_that_fails_costs_its_flight_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let place = Place { folder: folder.path().to_owned(), keep: true };
+    let place = place(folder.path(), true);
     let search = |_: &Path| -> Result<Verdict, Cause> { Err("out of ideas".into()) };
     let settings = Settings { flights: 1, ..settings(3, true) };
-    let stop = AtomicBool::new(false);
-    let results = run(&settings, &place, "updraft", &search, &stop, &|| {}).unwrap();
+    let results = run(&settings, &place, Share::default(), "updraft", &search).unwrap();
     let error = results.into_iter().next().unwrap().unwrap_err();
     assert!(error.to_string().starts_with("no verdict on"), "{error}");
     assert!(place.work(0).join("flight/plan.json").exists());

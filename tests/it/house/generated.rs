@@ -44,6 +44,10 @@ fn json_schemas_are_current() {
         (Format::BlindVerify, "blind-verify"),
         (Format::Next, "next"),
         (Format::Hidden, "hidden"),
+        (Format::Items, "items"),
+        (Format::AnalysisRecord, "analysis-record"),
+        (Format::Cluster, "cluster"),
+        (Format::ClusterStatus, "cluster-status"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

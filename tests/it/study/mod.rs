@@ -2,5 +2,5 @@
 
 mod result;
 mod resume;
-mod support;
+pub(crate) mod support;
 mod template;

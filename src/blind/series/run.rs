@@ -1,0 +1,178 @@
+//! Flights of a table, one after the other or many at once: sealed, flown, explained, opened, scored.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::place::Place;
+use super::{Draw, Settings, json};
+use crate::base::file::{create_folder, write_whole};
+use crate::base::shard::Share;
+use crate::blind::error::BlindError;
+use crate::blind::explain::Explain;
+use crate::blind::fly::fly;
+use crate::blind::score::{Outcome, score};
+use crate::blind::seal;
+use crate::campaign::read_json;
+
+/// Name and version of the format of one finished flight.
+pub const RESULT_SCHEMA: &str = "updraft.blind-flight/1";
+
+/// One finished flight: `flights/NNNNN.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlightResult {
+    /// Format name and version: `updraft.blind-flight/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// Its place in the table.
+    pub index: usize,
+    /// Published hash of its truth.
+    pub truth_sha256: String,
+    /// Hash of its verdict.
+    pub verdict_sha256: String,
+    /// What was hidden, in words.
+    pub truth: String,
+    /// The verdict against the truth.
+    pub outcome: Outcome,
+}
+
+/// Flies, explains and scores the flights of a share that are not finished yet. In the order of the
+/// table: what became of each. `done` is called after each.
+///
+/// Any number of processes may do so at once in one folder, on any number of machines: a result appears
+/// whole or not at all, and two that fly the same flight write the same.
+///
+/// # Errors
+/// Unreadable or foreign files in the folder, or `stop` was raised. What becomes of a single flight is
+/// in its own place.
+pub fn run(
+    settings: &Settings,
+    place: &Place,
+    share: Share,
+    made_by: &str,
+    explain: &dyn Explain,
+    stop: &AtomicBool,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Taken>, BlindError> {
+    let mut draws: Vec<(usize, Draw)> = settings.draws()?.into_iter().enumerate().collect();
+    draws.retain(|(index, _)| share.takes(*index));
+    create_folder(&place.folder.join("flights"))?;
+    let finished: Vec<Option<FlightResult>> = draws
+        .par_iter()
+        .map(|(index, draw)| finished(place, *index, draw, made_by))
+        .collect::<Result<_, _>>()?;
+    place.sweep();
+    let taken: Vec<_> = draws
+        .par_iter()
+        .zip(finished)
+        .map(|((index, draw), finished)| {
+            let was_there = finished.is_some();
+            let result = match finished {
+                Some(result) => Ok(result),
+                None if share.gather_only => Err(BlindError::NotFlown { index: *index }),
+                None if stop.load(Ordering::Relaxed) => Err(BlindError::Stopped),
+                None => one(draw, *index, place, made_by, explain, stop),
+            };
+            done();
+            Taken { index: *index, result, was_there }
+        })
+        .collect();
+    if stop.load(Ordering::Relaxed) {
+        return Err(BlindError::Stopped);
+    }
+    Ok(taken)
+}
+
+/// What became of a flight.
+#[derive(Debug)]
+pub struct Taken {
+    /// Place in the table.
+    pub index: usize,
+    /// Its result, or why there is none.
+    pub result: Result<FlightResult, BlindError>,
+    /// Whether it was finished before.
+    pub was_there: bool,
+}
+
+/// A flight that was finished before, if it is of this table and this version.
+fn finished(
+    place: &Place,
+    index: usize,
+    draw: &Draw,
+    made_by: &str,
+) -> Result<Option<FlightResult>, BlindError> {
+    let path = place.result(index);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let result: FlightResult = read_json(&path)?;
+    if result.schema != RESULT_SCHEMA {
+        let found = result.schema;
+        return Err(BlindError::Schema { path, found, wanted: RESULT_SCHEMA });
+    }
+    if result.made_by != made_by {
+        let (found, wanted) = (result.made_by, made_by.to_owned());
+        return Err(BlindError::Version { path, found, wanted });
+    }
+    let outcome = &result.outcome;
+    if outcome.seed != draw.seed || outcome.cell != *draw.cell {
+        let why = format!(
+            "it is {} with seed {}, not {} with seed {}",
+            outcome.cell.name(),
+            outcome.seed,
+            draw.cell.name(),
+            draw.seed
+        );
+        return Err(BlindError::Other { folder: place.folder.clone(), index, why });
+    }
+    Ok(Some(result))
+}
+
+/// Seals, flies, explains, and only then opens and scores.
+fn one(
+    draw: &Draw,
+    index: usize,
+    place: &Place,
+    made_by: &str,
+    explain: &dyn Explain,
+    stop: &AtomicBool,
+) -> Result<FlightResult, BlindError> {
+    let truth = draw.truth()?;
+    let work = place.flying(index);
+    create_folder(&work.0)?;
+    let hash = seal::seal(&work.0, &truth)?;
+    let flight = work.0.join("flight");
+    fly(&truth, &flight, Some(stop))?;
+    let verdict = match explain.explain(&flight) {
+        Ok(verdict) => verdict,
+        Err(source) => {
+            // For whoever looks into it.
+            let kept = place.work(index);
+            let flight = if work.keep(&kept).is_ok() { kept.join("flight") } else { flight };
+            return Err(BlindError::Explain { flight, source });
+        }
+    };
+    let verdict_path = work.0.join("verdict.json");
+    write_whole(&verdict_path, &json(&verdict)?)?;
+    let opened = seal::open(&work.0, &verdict_path, Some(&hash))?;
+    let fisher_z = explain.fisher_z(&flight, &opened.truth);
+    let result = FlightResult {
+        schema: RESULT_SCHEMA.to_owned(),
+        made_by: made_by.to_owned(),
+        index,
+        truth_sha256: opened.truth_sha256,
+        verdict_sha256: opened.verdict_sha256,
+        truth: opened.truth.words(),
+        outcome: score(&opened.truth, &verdict, &fisher_z),
+    };
+    if place.keep {
+        work.keep(&place.work(index))?;
+    }
+    // The result last: where it is, all is.
+    write_whole(&place.result(index), &json(&result)?)?;
+    Ok(result)
+}

@@ -1,0 +1,73 @@
+//! Submission and cancellation of a job.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::job::Job;
+use super::measure::Measured;
+use super::queue::{ask, must};
+use super::record::ClusterRecord;
+use super::script::submit_script;
+use crate::base::file::write_whole;
+use crate::base::plain::Shown as _;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::host::Host;
+use crate::workflow::made_by;
+
+/// A job that was submitted.
+#[derive(Clone, Debug)]
+pub struct Submitted {
+    /// Record of the job.
+    pub record: ClusterRecord,
+    /// Path of the script that submitted it.
+    pub script: PathBuf,
+}
+
+/// Writes the script of a job and runs it.
+///
+/// # Errors
+///
+/// If a job for these results is still in the queue, or the scheduler does not take it.
+pub fn submit(
+    host: &dyn Host,
+    job: &Job,
+    shards: u32,
+    measured: Option<&Measured>,
+) -> Result<Submitted, WorkflowError> {
+    let text = submit_script(job, shards, measured, &made_by())?;
+    if let Ok((last, place)) = ClusterRecord::read(&job.folder) {
+        let queued = ask(&last, &place, host.clock().unix_us() / 1_000_000).queued;
+        if queued.is_ok_and(|queued| !queued.is_empty()) {
+            return Err(WorkflowError::Usage(format!(
+                "job {} for these results is still in the queue; wait for it, or `updraft cluster cancel {}`",
+                last.array_job,
+                job.folder.shown()
+            )));
+        }
+    }
+    let script = job.folder.join("submit.sh");
+    write_whole(&script, text.as_bytes())?;
+    let output = Command::new("bash").arg(&script).stdin(Stdio::null()).output();
+    let output =
+        output.map_err(|error| WorkflowError::Failed(format!("bash cannot be run: {error}")))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        return Err(WorkflowError::Failed(format!(
+            "the job was not submitted by {}: {said}",
+            script.shown()
+        )));
+    }
+    let (record, _) = ClusterRecord::read(&job.folder)?;
+    Ok(Submitted { record, script })
+}
+
+/// Takes a job and its merge out of the queue; tasks that run end with what is finished. Returns its record.
+///
+/// # Errors
+///
+/// If the folder has no job, or the scheduler refuses.
+pub fn cancel(folder: &Path) -> Result<ClusterRecord, WorkflowError> {
+    let (record, _) = ClusterRecord::read(folder)?;
+    must("scancel", &[&record.array_job, &record.merge_job])?;
+    Ok(record)
+}
