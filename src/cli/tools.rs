@@ -7,6 +7,7 @@ use schemars::schema_for;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::analysis::result::Analysis;
+use crate::archive::index::ArchiveIndex;
 use crate::blind::game::GameFile;
 use crate::blind::record::BlindRecord;
 use crate::blind::seal::Sealed;
@@ -24,6 +25,7 @@ use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
+use crate::workflow::archive::output::ArchiveOutput;
 use crate::workflow::fleet::output::FlyOutput;
 use crate::workflow::fleet::preflight::PreflightOutput;
 use crate::workflow::game::verify::Verification;
@@ -90,6 +92,10 @@ pub enum Format {
     Next,
     /// hidden.json of `updraft run --hide`
     Hidden,
+    /// what `updraft archive --json` prints
+    Archive,
+    /// archive.json of an archive
+    ArchiveIndex,
 }
 
 impl Format {
@@ -118,6 +124,8 @@ impl Format {
             Self::BlindVerify => schema_for!(Verification),
             Self::Next => schema_for!(Next),
             Self::Hidden => schema_for!(HiddenRun),
+            Self::Archive => schema_for!(ArchiveOutput),
+            Self::ArchiveIndex => schema_for!(ArchiveIndex),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

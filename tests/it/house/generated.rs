@@ -44,6 +44,8 @@ fn json_schemas_are_current() {
         (Format::BlindVerify, "blind-verify"),
         (Format::Next, "next"),
         (Format::Hidden, "hidden"),
+        (Format::Archive, "archive"),
+        (Format::ArchiveIndex, "archive-index"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();
