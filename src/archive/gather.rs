@@ -79,16 +79,17 @@ impl Campaign {
             return Err(ArchiveError::TooMany { number, what: "days", most: MOST_DAYS });
         }
         let mut staging = Staging::begin(archive)?;
-        self.write_seconds(&flown, &dates, &mut staging)?;
+        self.write_seconds(&flown, &dates, days.keys().copied(), &mut staging)?;
         for (date, flown) in &days {
             let of = || flown.iter().copied();
             staging.write("drones", date, drones::columns(), of().flat_map(drones::rows))?;
             staging.write("thermals", date, thermals::columns(), of().flat_map(thermals::rows))?;
             staging.write("flights", date, flights::columns(), of().cloned())?;
-        }
-        if let Some(verdict) = &self.sources.verdict {
-            let date = dates.first().map_or(NO_DATE, String::as_str);
-            staging.write("verdicts", date, verdicts::columns(), verdicts::rows(verdict))?;
+            // A verdict is the campaign's: it stands at the date of its first flight.
+            let is_first = dates.first().is_some_and(|first| first == date);
+            let verdict = self.sources.verdict.as_ref().filter(|_| is_first);
+            let rows = verdict.map(verdicts::rows).unwrap_or_default();
+            staging.write("verdicts", date, verdicts::columns(), rows)?;
         }
         Ok(ArchivedCampaign {
             id: self.id.clone(),
@@ -123,44 +124,35 @@ impl Campaign {
     }
 
     /// Streams the long table: one drone of the analysis is in memory, and one group of rows for each day.
-    fn write_seconds(
+    fn write_seconds<'d>(
         &self,
         flown: &[Flown<'_>],
         dates: &[String],
+        days: impl Iterator<Item = &'d str>,
         staging: &mut Staging,
     ) -> Result<(), ArchiveError> {
         const TABLE: &str = "seconds";
-        let mut days: BTreeMap<&str, Table<SecondRow, File>> = BTreeMap::new();
+        let begun = days.map(|date| Ok((date, staging.table(TABLE, date, seconds::columns())?)));
+        let mut tables: BTreeMap<&str, Table<SecondRow, File>> =
+            begun.collect::<Result<_, ArchiveError>>()?;
         let mut failed = None;
         let walked = series::walk(self.sources.rewound()?, &mut |flight, time_s, series| {
-            let (flown, date) = flown
-                .get(flight)
-                .zip(dates.get(flight))
-                .ok_or_else(|| "a flight more than before".to_owned())?;
-            let mut write = || {
-                if !days.contains_key(date.as_str()) {
-                    let table = staging.table(TABLE, date, seconds::columns())?;
-                    days.insert(date, table);
-                }
-                let Some(table) = days.get_mut(date.as_str()) else { return Ok(()) };
-                for row in seconds::rows(flown, time_s, &series) {
-                    table.push(row).map_err(|error| ArchiveError::Table {
-                        table: TABLE,
-                        reason: error.to_string(),
-                    })?;
-                }
-                Ok(())
-            };
-            write().map_err(|error: ArchiveError| {
-                failed = Some(error);
-                String::new()
-            })
+            let flight = flown.get(flight).zip(dates.get(flight));
+            let flight = flight.and_then(|(flown, date)| Some((flown, tables.get_mut(&**date)?)));
+            let (flown, table) = flight.ok_or_else(|| "a flight more than before".to_owned())?;
+            seconds::rows(flown, time_s, &series).try_for_each(|row| table.push(row)).map_err(
+                |error| {
+                    let reason = error.to_string();
+                    failed = Some(ArchiveError::Table { table: TABLE, reason });
+                    String::new()
+                },
+            )
         });
         if let Some(error) = failed {
             return Err(error);
         }
         walked.map_err(|reason| broken(&analysis_path(&self.sources.folder), reason))?;
-        for (date, table) in days {
+        for (date, table) in tables {
             staging.finish(TABLE, date, table)?;
         }
         Ok(())

@@ -67,7 +67,7 @@ impl Staging {
         Ok(())
     }
 
-    /// Writes a short table of one date, if it has rows.
+    /// Writes a short table of one date, also one without rows: whoever asks for a table finds it.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -78,10 +78,6 @@ impl Staging {
         columns: Vec<Column<R>>,
         rows: impl IntoIterator<Item = R>,
     ) -> Result<(), ArchiveError> {
-        let mut rows = rows.into_iter().peekable();
-        if rows.peek().is_none() {
-            return Ok(());
-        }
         let mut written = self.table(table, date, columns)?;
         for row in rows {
             written
