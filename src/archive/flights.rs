@@ -121,7 +121,9 @@ pub fn columns<'a>() -> Vec<Column<Flown<'a>>> {
         real("height_m", Flown::height_m),
         real("w_mps", |row| row.mean()?.value),
         real("w_se_mps", |row| row.mean()?.error()),
-        real("w_sd_mps", |row| row.flight.statistics.as_ref()?.record.sd_mps),
+        real("w_sd_mps", |row| {
+            row.flight.statistics.as_ref()?.record.sd_mps.filter(|sd_mps| *sd_mps > 0.0)
+        }),
         real("zero_se_mps", |row| row.map()?.common.as_ref()?.zero_mps),
         real("common_se_mps", |row| row.map()?.common.as_ref()?.se_mps),
         real("wind_mps", |row| row.wind_speed().value),

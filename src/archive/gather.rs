@@ -8,6 +8,7 @@ use super::flights::{self, Flown};
 use super::index::{ArchivedCampaign, NO_DATE, id_of};
 use super::origin::Origin;
 use super::seconds::{self, SecondRow};
+use super::slim::Span;
 use super::sources::{Sources, analysis_path, broken};
 use super::staging::Staging;
 use super::table::Table;
@@ -135,19 +136,26 @@ impl Campaign {
         let begun = days.map(|date| Ok((date, staging.table(TABLE, date, seconds::columns())?)));
         let mut tables: BTreeMap<&str, Table<SecondRow, File>> =
             begun.collect::<Result<_, ArchiveError>>()?;
+        let spans: Vec<Span> = flown
+            .iter()
+            .map(|flown| flown.map().map(|map| map.time_s).unwrap_or_default())
+            .collect();
         let mut failed = None;
-        let walked = series::walk(self.sources.rewound()?, &mut |flight, time_s, series| {
-            let flight = flown.get(flight).zip(dates.get(flight));
-            let flight = flight.and_then(|(flown, date)| Some((flown, tables.get_mut(&**date)?)));
-            let (flown, table) = flight.ok_or_else(|| "a flight more than before".to_owned())?;
-            seconds::rows(flown, time_s, &series).try_for_each(|row| table.push(row)).map_err(
-                |error| {
-                    let reason = error.to_string();
-                    failed = Some(ArchiveError::Table { table: TABLE, reason });
-                    String::new()
-                },
-            )
-        });
+        let walked =
+            series::walk(self.sources.rewound()?, &spans, &mut |flight, time_s, series| {
+                let flight = flown.get(flight).zip(dates.get(flight));
+                let flight =
+                    flight.and_then(|(flown, date)| Some((flown, tables.get_mut(&**date)?)));
+                let (flown, table) =
+                    flight.ok_or_else(|| "a flight more than before".to_owned())?;
+                seconds::rows(flown, time_s, &series).try_for_each(|row| table.push(row)).map_err(
+                    |error| {
+                        let reason = error.to_string();
+                        failed = Some(ArchiveError::Table { table: TABLE, reason });
+                        String::new()
+                    },
+                )
+            });
         if let Some(error) = failed {
             return Err(error);
         }

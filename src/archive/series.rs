@@ -6,7 +6,7 @@ use std::io::Read;
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::slim::Flag;
+use super::slim::{Flag, Span};
 use crate::base::parse;
 
 /// Seconds that a series may have: twelve days.
@@ -107,12 +107,13 @@ pub struct Series {
 /// Taker of one drone after the other: index of the flight, times (show time, s) and series. An error ends the walk.
 pub type Taker<'a> = dyn FnMut(usize, &[f64], Series) -> Result<(), String> + 'a;
 
-/// Walks through the maps of an analysis.
+/// Walks through the maps of an analysis; `spans`: the seconds of each flight's map, for files whose times stand behind the
+/// drones.
 ///
 /// # Errors
 /// The words of what is wrong with the JSON, or of the taker.
-pub fn walk(reader: impl Read, take: &mut Taker<'_>) -> Result<(), String> {
-    let mut at = At { flight: 0, time_s: Vec::new(), take };
+pub fn walk(reader: impl Read, spans: &[Span], take: &mut Taker<'_>) -> Result<(), String> {
+    let mut at = At { flight: 0, time_s: Vec::new(), spans, take };
     parse::json_from(reader, Walk { place: Place::Analysis, at: &mut at })
         .map_err(|error| error.to_string())
 }
@@ -121,6 +122,7 @@ pub fn walk(reader: impl Read, take: &mut Taker<'_>) -> Result<(), String> {
 struct At<'a, 'b> {
     flight: usize,
     time_s: Vec<f64>,
+    spans: &'a [Span],
     take: &'a mut Taker<'b>,
 }
 
@@ -197,13 +199,15 @@ impl<'de> Visitor<'de> for Walk<'_, '_, '_> {
                 self.at.time_s.clear();
             },
             Place::Drones => {
+                let At { flight, time_s, spans, take } = &mut *self.at;
+                let span = spans.get(*flight).copied().unwrap_or_default();
+                if time_s.is_empty() && span.count > 0 {
+                    let span = Some(span).filter(|span| span.count <= MOST_SECONDS);
+                    *time_s = span.and_then(|span| span.times_s()).ok_or_else(|| {
+                        A::Error::custom("the times of a map must stand before its drones")
+                    })?;
+                }
                 while let Some(series) = list.next_element::<Series>()? {
-                    let At { flight, time_s, take } = &mut *self.at;
-                    if time_s.is_empty() && !series.updraft_mps.is_empty() {
-                        return Err(A::Error::custom(
-                            "the times of a map must stand before its drones",
-                        ));
-                    }
                     take(*flight, time_s, series).map_err(A::Error::custom)?;
                 }
             }
@@ -227,7 +231,7 @@ mod tests {
     #[test]
     fn drones_come_one_by_one_with_their_flight_and_times() {
         let mut seen = Vec::new();
-        walk(TEXT.as_bytes(), &mut |flight, time_s, series| {
+        walk(TEXT.as_bytes(), &[], &mut |flight, time_s, series| {
             assert_eq!(time_s, [10.0, 11.0]);
             seen.push((flight, series.slot, series.updraft_mps.at(1), series.posterior_mps.at(0)));
             Ok(())
@@ -243,14 +247,23 @@ mod tests {
 
     #[test]
     fn drones_before_their_times_and_endless_series_are_refused() {
-        let text = r#"{"flights": [{"map": {"drones": [{"updraft_mps": [1]}], "time_s": [0]}}]}"#;
-        let error = walk(text.as_bytes(), &mut |_, _, _| Ok(())).unwrap_err();
+        let text = r#"{"flights": [{"map": {"drones": [{"updraft_mps": [1]}], "time_s": [5]}}]}"#;
+        let uneven = Span { ends_s: Some([5.0, 9.0]), count: 2, is_uneven: true };
+        let error = walk(text.as_bytes(), &[uneven], &mut |_, _, _| Ok(())).unwrap_err();
         assert!(error.starts_with("the times of a map must stand before"), "{error}");
+        let span = Span { ends_s: Some([5.0, 6.0]), count: 2, is_uneven: false };
+        let mut seen = Vec::new();
+        walk(text.as_bytes(), &[span], &mut |_, time_s, _| {
+            seen.extend_from_slice(time_s);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(seen, [5.0, 6.0]);
         let long = format!(
             r#"{{"flights": [{{"map": {{"time_s": [0{}]}}}}]}}"#,
             ",0".repeat(MOST_SECONDS)
         );
-        let error = walk(long.as_bytes(), &mut |_, _, _| Ok(())).unwrap_err();
+        let error = walk(long.as_bytes(), &[], &mut |_, _, _| Ok(())).unwrap_err();
         assert!(error.starts_with("invalid length 1048577"), "{error}");
     }
 }

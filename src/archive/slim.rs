@@ -239,11 +239,29 @@ pub struct Map {
     pub thermals: Vec<Thermal>,
 }
 
-/// First and last of a list of times, which is not kept.
+/// Seconds of a map: a list of times that is kept by its ends, as they are evenly spaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Span {
     /// First and last time, s; absent: the list is empty.
     pub ends_s: Option<[f64; 2]>,
+    /// Number of times.
+    pub count: usize,
+    /// Whether a time is off the even spacing of 1 s.
+    pub is_uneven: bool,
+}
+
+/// Distance of the times of a map, s.
+const STEP_S: f64 = 1.0;
+/// A time is even up to this, s.
+const EVEN_S: f64 = 1e-6;
+
+impl Span {
+    /// The time of each second; `None` where they are not even.
+    pub fn times_s(&self) -> Option<Vec<f64>> {
+        let [first_s, _] = self.ends_s?;
+        let times = (0..self.count).map(|index| first_s + STEP_S * index as f64);
+        (!self.is_uneven).then(|| times.collect())
+    }
 }
 
 impl<'de> Deserialize<'de> for Span {
@@ -257,11 +275,15 @@ impl<'de> Deserialize<'de> for Span {
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut times: A) -> Result<Span, A::Error> {
-                let mut ends_s = None;
+                let mut span = Span::default();
                 while let Some(time_s) = times.next_element::<f64>()? {
-                    ends_s = Some([ends_s.map_or(time_s, |ends: [f64; 2]| ends[0]), time_s]);
+                    let first_s = span.ends_s.map_or(time_s, |ends| ends[0]);
+                    let even_s = first_s + STEP_S * span.count as f64;
+                    span.is_uneven |= (time_s - even_s).abs() > EVEN_S;
+                    span.ends_s = Some([first_s, time_s]);
+                    span.count += 1;
                 }
-                Ok(Span { ends_s })
+                Ok(span)
             }
         }
         deserializer.deserialize_seq(Ends)
@@ -500,10 +522,12 @@ mod tests {
 
     #[test]
     fn times_leave_their_ends() {
-        let span = |text: &str| parse::json::<Span>(text.as_bytes()).unwrap().ends_s;
-        assert_eq!(span("[]"), None);
-        assert_eq!(span("[95.0]"), Some([95.0, 95.0]));
-        assert_eq!(span("[95, 96, 97.5]"), Some([95.0, 97.5]));
+        let span = |text: &str| parse::json::<Span>(text.as_bytes()).unwrap();
+        assert_eq!((span("[]").ends_s, span("[]").times_s()), (None, None));
+        assert_eq!(span("[95.0]").ends_s, Some([95.0, 95.0]));
+        assert_eq!(span("[95, 96, 97]").times_s(), Some(vec![95.0, 96.0, 97.0]));
+        let uneven = span("[95, 96, 97.5]");
+        assert_eq!((uneven.ends_s, uneven.times_s()), (Some([95.0, 97.5]), None));
     }
 
     #[test]

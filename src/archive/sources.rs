@@ -26,8 +26,8 @@ use crate::mission::Plan;
 
 /// Counted up when the tables change, so that every campaign is gathered anew.
 const FORMAT: u32 = 1;
-/// Largest analysis that is read, bytes: that of 5,000 drones over 10 min has some hundred megabytes.
-const MOST_ANALYSIS_BYTES: u64 = 4 << 30;
+/// Largest analysis that is read, bytes: that of 5,000 drones over 10 min has half as many.
+const MOST_ANALYSIS_BYTES: u64 = 1 << 30;
 /// Largest of the other files, bytes.
 const MOST_BYTES: u64 = 64 << 20;
 /// Earlier starts of a flight that are looked at.
@@ -87,7 +87,13 @@ impl Sources {
             opened => opened.map_err(|error| fail(&path, error))?,
         };
         if metadata.len() > MOST_ANALYSIS_BYTES {
-            return Err(broken(&path, format!("it has {} bytes", metadata.len())));
+            return Err(broken(
+                &path,
+                format!(
+                    "it has {} bytes, more than the {MOST_ANALYSIS_BYTES} allowed here",
+                    metadata.len()
+                ),
+            ));
         }
         let mut hashed = Hashed::default();
         hashed.add("analysis", &hash_of(&mut analysis).map_err(|error| fail(&path, error))?);
