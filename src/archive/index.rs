@@ -34,7 +34,7 @@ pub struct ArchiveIndex {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArchivedCampaign {
-    /// Its id, the value of the partition `campaign`.
+    /// Id, the value of the partition `campaign`.
     pub id: String,
     /// Folder that it was gathered from.
     pub folder: PathBuf,
@@ -43,7 +43,7 @@ pub struct ArchivedCampaign {
     /// Whether it was simulated; absent: not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulated: Option<bool>,
-    /// Its partitions.
+    /// Partitions of the campaign.
     pub parts: Vec<Part>,
 }
 

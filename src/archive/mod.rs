@@ -68,9 +68,9 @@ pub enum ArchiveError {
     /// It has more days, or more flights, than a campaign has.
     #[error("it has {number} {what}, more than the {most} that a campaign may have")]
     TooMany {
-        /// How many.
+        /// Number of them.
         number: usize,
-        /// Of what.
+        /// Name of what there is too much of.
         what: &'static str,
         /// Most that are taken.
         most: usize,

@@ -84,16 +84,16 @@ pub struct Series {
     /// Running estimate, m/s.
     #[serde(default)]
     pub updraft_mps: Values<Option<f64>>,
-    /// Its statistical error, m/s.
+    /// Statistical error of the estimate, m/s.
     #[serde(default)]
     pub sd_mps: Values<Option<f64>>,
-    /// Its 95 % interval, m/s.
+    /// 95 % interval of the true value, m/s.
     #[serde(default)]
     pub interval_mps: Values<Option<[f64; 2]>>,
     /// Posterior mean, m/s.
     #[serde(default)]
     pub posterior_mps: Values<Option<f64>>,
-    /// Its standard deviation, m/s.
+    /// Standard deviation of the posterior, m/s.
     #[serde(default)]
     pub posterior_sd_mps: Values<Option<f64>>,
     /// Doubts by stretches of time.

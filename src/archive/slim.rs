@@ -356,7 +356,7 @@ pub struct MapDrone {
     pub mapping: String,
     /// Mean, m/s.
     pub mean: Known,
-    /// Its 95 % interval, m/s.
+    /// 95 % interval of the mean, m/s.
     #[serde(default)]
     pub mean_interval_mps: Option<[Option<f64>; 2]>,
     /// Origins of its error.
@@ -509,9 +509,9 @@ pub struct Baseline {
 /// The slow air that a mean averages.
 #[derive(Debug, Deserialize)]
 pub struct BaselineOf {
-    /// Its standard deviation, m/s.
+    /// Standard deviation of the slow air, m/s.
     pub sd_mps: Option<f64>,
-    /// Its integral time, s.
+    /// Integral time of the slow air, s.
     pub integral_time_s: Option<f64>,
 }
 

@@ -26,8 +26,8 @@ use crate::mission::Plan;
 
 /// Counted up when the tables change, so that every campaign is gathered anew.
 const FORMAT: u32 = 1;
-/// Largest analysis that is read, bytes: that of 5,000 drones over 10 min has half as many.
-const MOST_ANALYSIS_BYTES: u64 = 1 << 30;
+/// Largest analysis that is read, bytes: those of 5,000 drones, flown twice, have less than half as many.
+const MOST_ANALYSIS_BYTES: u64 = 4 << 30;
 /// Largest of the other files, bytes.
 const MOST_BYTES: u64 = 64 << 20;
 /// Earlier starts of a flight that are looked at.
@@ -40,7 +40,7 @@ pub fn analysis_path(folder: &Path) -> PathBuf {
     folder.join("analysis.json")
 }
 
-/// What an archive takes of a campaign, beside its analysis, which stays open.
+/// Files of a campaign that an archive takes from; its analysis stays open.
 #[derive(Debug)]
 pub struct Sources {
     /// Folder of the campaign, without links.
@@ -54,7 +54,7 @@ pub struct Sources {
     analysis: File,
 }
 
-/// What is known of a flight beside its analysis.
+/// Plan and records of a flight.
 #[derive(Debug)]
 pub struct FlightSources {
     /// Plan.
@@ -67,7 +67,7 @@ pub struct FlightSources {
     pub starts: Vec<StartRecord>,
     /// Logs that were brought home.
     pub manifest: Option<Manifest>,
-    /// Which drone flies which slot.
+    /// Table of drones and slots.
     pub fleet: Option<FleetTable>,
 }
 

@@ -11,7 +11,7 @@ use super::ending::Ending;
 use super::error::WorkflowError;
 use super::host::Host;
 
-/// What is to be gathered.
+/// Request to gather campaigns.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// Folders that are campaigns or hold some.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::archive::support::{Campaign, archive, outcomes, parts, table};
+use crate::archive::support::{Campaign, archive, parts, table};
 use crate::cli::support::{Bench, contents};
 
 fn analysis_of(folder: &Path) -> Value {
