@@ -141,7 +141,7 @@ pub fn columns<'a>() -> Vec<Column<DroneRow<'a>>> {
         text("drone", |row| {
             row.drone.map(|drone| drone.name.as_str()).or(row.mapped.map(|of| of.name.as_str()))
         }),
-        text("airframe", |row| row.airframe()),
+        text("airframe", DroneRow::airframe),
         text("source", |row| Some(&row.drone?.source)),
         text("effort_unit", |row| Some(row.flown.flight.indicator.unit())),
         text("law", |row| Some(row.flown.flight.headline.as_ref()?.law.as_str())),

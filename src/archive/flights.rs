@@ -117,7 +117,7 @@ pub fn columns<'a>() -> Vec<Column<Flown<'a>>> {
         whole("drones_measured", |row| Some(row.measured() as i64)),
         whole("slots_missing", |row| Some(row.flight.missing.len() as i64)),
         whole("logs", |row| Some(row.flight.logs as i64)),
-        text("law", |row| row.law()),
+        text("law", Flown::law),
         real("height_m", Flown::height_m),
         real("w_mps", |row| row.mean()?.value),
         real("w_se_mps", |row| row.mean()?.error()),

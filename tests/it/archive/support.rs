@@ -39,7 +39,9 @@ pub(crate) fn small() -> Analysis {
             map.time_s.truncate(SECONDS);
             for drone in &mut map.drones {
                 let lists = [&mut drone.updraft_mps, &mut drone.sd_mps, &mut drone.posterior_mps];
-                lists.into_iter().for_each(|list| list.truncate(SECONDS));
+                for list in lists {
+                    list.truncate(SECONDS);
+                }
                 drone.posterior_sd_mps.truncate(SECONDS);
                 drone.interval_mps.truncate(SECONDS);
                 drone.truth_mps.iter_mut().for_each(|list| list.truncate(SECONDS));
