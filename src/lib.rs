@@ -29,6 +29,7 @@
 //! * [`gap`]: which physics a simulation lacks, by measured logs.
 //! * [`blind`]: flights with hidden physics that test it.
 //! * [`report`]: figures, tables and the HTML page.
+//! * [`archive`]: many campaigns as one Parquet dataset.
 //! * [`campaign`]: names of the files in a campaign folder.
 //! * [`workflow`]: the steps of people with drones, for any program.
 //! * [`cli`]: arguments, terminal and exit codes of the program `updraft`.
@@ -40,6 +41,7 @@
 //! formats and is converted at that border. Rotor control pulse widths are microseconds.
 
 pub mod analysis;
+pub mod archive;
 pub mod base;
 pub mod blind;
 pub mod campaign;

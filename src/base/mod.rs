@@ -1,6 +1,7 @@
 //! Foundations that every room uses: frames, time, checksums, estimates, random streams, whole
 //! files.
 
+pub mod calendar;
 pub mod causes;
 pub mod digest;
 pub mod estimate;

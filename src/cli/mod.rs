@@ -2,6 +2,7 @@
 
 mod analyze;
 mod analyze_each;
+mod archive;
 mod blind;
 mod check;
 mod cluster;
@@ -61,6 +62,7 @@ use crate::workflow::clock::SharedClock;
   updraft sweep                                   the paper's simulation study, with its figure 2
   updraft analyze my-campaign                     or a folder of logs, or one log
   updraft gap my-campaign                         what physics the model lacks
+  updraft archive seasons/                        all campaigns below as one Parquet dataset
   updraft inspect my-campaign/show.skyc
 
 Exit codes: 0 done; 1 a file or folder does not exist, or cannot be read or written; 2 wrong
@@ -142,6 +144,8 @@ enum Command {
     Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
+    /// Gather campaigns into one Parquet dataset, for queries over a season
+    Archive(archive::ArchiveArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate the results with the truth
     Sweep(sweep::SweepArgs),
     /// Find where simulation and measurement disagree, name the missing physics, and add it
@@ -233,6 +237,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Logs(args) => logs::run(context, &args),
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
+        Command::Archive(args) => archive::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),
         Command::Gap(args) => gap::run(context, &args),
         Command::Blind(args) => blind::run(context, &args),

@@ -7,6 +7,7 @@ use schemars::schema_for;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::analysis::result::Analysis;
+use crate::archive::index::ArchiveIndex;
 use crate::blind::game::GameFile;
 use crate::blind::record::BlindRecord;
 use crate::blind::seal::Sealed;
@@ -26,6 +27,7 @@ use crate::study::CellRecord;
 use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
 use crate::workflow::analyze::each::AnalysisRecord;
+use crate::workflow::archive::output::ArchiveOutput;
 use crate::workflow::cluster::{ClusterRecord, Status};
 use crate::workflow::fleet::output::FlyOutput;
 use crate::workflow::fleet::preflight::PreflightOutput;
@@ -101,6 +103,10 @@ pub enum Format {
     Cluster,
     /// what `updraft cluster status --json` prints
     ClusterStatus,
+    /// what `updraft archive --json` prints
+    Archive,
+    /// archive.json of an archive
+    ArchiveIndex,
 }
 
 impl Format {
@@ -133,6 +139,8 @@ impl Format {
             Self::AnalysisRecord => schema_for!(AnalysisRecord),
             Self::Cluster => schema_for!(ClusterRecord),
             Self::ClusterStatus => schema_for!(Status),
+            Self::Archive => schema_for!(ArchiveOutput),
+            Self::ArchiveIndex => schema_for!(ArchiveIndex),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

@@ -32,6 +32,7 @@
 //! ```
 
 pub mod analyze;
+pub mod archive;
 pub mod blind;
 pub mod check;
 pub mod clock;

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod analysis;
+#[cfg(feature = "parquet")]
+mod archive;
 mod blind;
 mod campaign;
 mod check;

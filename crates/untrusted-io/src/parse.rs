@@ -3,7 +3,7 @@
 //! A show's cue, a template's title, a server's reason: wherever they are printed later, they are
 //! text. Errors are the parser's own, with line and column; what they quote is plain as well.
 
-use std::fmt;
+use std::{fmt, io};
 
 use serde::de::{
     DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess,
@@ -20,6 +20,22 @@ use crate::plain::{plain, plain_string};
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value = T::deserialize(Plain(&mut reader))?;
+    reader.end()?;
+    Ok(value)
+}
+
+/// Deserializes JSON as it is read, so that a seed can take long lists apart without holding them; every string
+/// and key arrives as [`plain`] text. The reader should be buffered, and end within bounds.
+///
+/// # Errors
+///
+/// If the reader fails, or as [`json`].
+pub fn json_from<'de, S: DeserializeSeed<'de>>(
+    reader: impl io::Read,
+    seed: S,
+) -> serde_json::Result<S::Value> {
+    let mut reader = serde_json::Deserializer::from_reader(reader);
+    let value = seed.deserialize(Plain(&mut reader))?;
     reader.end()?;
     Ok(value)
 }

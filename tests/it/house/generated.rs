@@ -48,6 +48,8 @@ fn json_schemas_are_current() {
         (Format::AnalysisRecord, "analysis-record"),
         (Format::Cluster, "cluster"),
         (Format::ClusterStatus, "cluster-status"),
+        (Format::Archive, "archive"),
+        (Format::ArchiveIndex, "archive-index"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

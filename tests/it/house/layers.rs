@@ -29,6 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("gap", &["base", "numeric", "mission", "flight", "analysis"]),
     ("blind", &["base", "numeric", "mission", "campaign", "flight", "analysis", "gap"]),
     ("study", &["base", "numeric", "mission", "flight", "analysis"]),
+    ("archive", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis", "gap"]),
     ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study"]),
     (
         "workflow",
@@ -46,6 +47,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "blind",
             "study",
             "report",
+            "archive",
         ],
     ),
 ];

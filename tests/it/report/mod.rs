@@ -5,6 +5,6 @@ mod chromium;
 mod fields;
 mod gap;
 mod page;
-mod synthetic;
+pub(crate) mod synthetic;
 mod terminal;
 mod verdicts;
