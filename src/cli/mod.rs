@@ -19,6 +19,7 @@ mod physics;
 mod plan;
 mod progress;
 mod run;
+mod sensitivity;
 mod show_text;
 mod signals;
 mod simulate;

@@ -7,11 +7,13 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::sensitivity::{self, Asked};
 use crate::base::plain::Shown as _;
 use crate::report;
 use crate::study::result::StudyResult;
-use crate::study::{Settings, StudyPlan, Work};
+use crate::study::{AnyStudy, Settings, StudyPlan, Work};
 use crate::workflow::clock::Stopwatch;
+use crate::workflow::sensitivity::Settings as CampaignSettings;
 use crate::workflow::study::{BUILT_IN, evaluated, fly, refuse_campaign, write};
 
 /// Width of the terminal summary, columns: at most, and at least.
@@ -24,13 +26,16 @@ const MIN_WIDTH: usize = 60;
   updraft sweep templates/study.toml
   updraft sweep my-study.toml -o my-study --seed 7
   updraft sweep --keep-logs
+  updraft sweep sensitivity -o what-decides           # whole campaigns: what decides the map's error
 
 Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and
 u0 held fixed at those of still air, and writes study.json and report/index.html. Finished flights
 are kept in cells/: running the same command again resumes an interrupted study, and after a change
-to the study only what changed is flown. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
+to the study only what changed is flown. A sensitivity study (schema updraft.sensitivity/1, built in
+as `sensitivity`) flies whole campaigns that differ in some factors, keeps their outcomes in items/, and
+writes results.parquet, results.csv, sensitivity.json and the report. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
 pub(super) struct SweepArgs {
-    /// Study: a file or the built-in name
+    /// Study: a file, or a built-in name (study, sensitivity)
     #[arg(default_value = BUILT_IN)]
     study: String,
     /// Folder for the study's flights and results
@@ -42,7 +47,7 @@ pub(super) struct SweepArgs {
     /// Flights at the same time [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Keep the log of every flight in logs/
+    /// Keep the log of every flight in logs/ (of a sensitivity study: every campaign's folder in work/)
     #[arg(long)]
     keep_logs: bool,
     /// Fly finished flights again
@@ -61,22 +66,39 @@ struct SweepOutput<'a> {
 }
 
 pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start(context);
-    let study = StudyPlan::load(&args.study)?;
+    let study = AnyStudy::load(&args.study)?;
     refuse_campaign(&args.output)?;
     let _lock = context.lock(&args.output)?;
+    match study {
+        AnyStudy::Ladder(study) => ladder(context, args, &study),
+        AnyStudy::Sensitivity(study) => {
+            let settings =
+                CampaignSettings { seed: args.seed, keep: args.keep_logs, jobs: args.jobs };
+            let (output, force) = (args.output.clone(), args.force);
+            let asked = Asked { output, force, settings, command: command(args) };
+            sensitivity::run(context, &study, &asked, &|_| true, width(context))
+        }
+    }
+}
+
+/// Columns of the terminal summary.
+fn width(context: &Context) -> usize {
+    context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH))
+}
+
+fn ladder(context: &Context, args: &SweepArgs, study: &StudyPlan) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start(context);
     let settings = Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force };
-    let work = Work::open(&study, &args.output, settings)?;
+    let work = Work::open(study, &args.output, settings)?;
     let (total, open) = (work.total(), work.open_flights());
     if open < total {
         context.say(&format!("{} of {total} flights are there already", total - open));
     }
     let flown = fly(context, work, "flying", args.jobs)?;
     let flying = watch.to_string();
-    let result = evaluated(context, &study, args.seed, &flown)?;
+    let result = evaluated(context, study, args.seed, &flown)?;
     if !context.json {
-        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
-        context.print(&report::study_summary(&result, width, context.color))?;
+        context.print(&report::study_summary(&result, width(context), context.color))?;
     }
     let page = write(&args.output, command(args), args.seed, &result)?;
     if context.json {

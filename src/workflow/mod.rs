@@ -49,6 +49,7 @@ pub mod physics;
 pub mod plan;
 mod provenance;
 pub mod run;
+pub mod sensitivity;
 mod shared_clock;
 pub mod shows;
 pub mod simulate;
