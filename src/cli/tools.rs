@@ -23,6 +23,7 @@ use crate::gap::next::Next;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
+use crate::study::sensitivity::{ItemRecord, SensitivityResult};
 use crate::vehicle::Vehicle;
 use crate::workflow::fleet::output::FlyOutput;
 use crate::workflow::fleet::preflight::PreflightOutput;
@@ -58,6 +59,10 @@ pub enum Format {
     Study,
     /// a finished flight of a study
     Cell,
+    /// sensitivity.json of a sensitivity study
+    Sensitivity,
+    /// a finished campaign of a sensitivity study
+    SensitivityItem,
     /// vehicle files
     Vehicle,
     /// logs/manifest.json
@@ -103,6 +108,8 @@ impl Format {
             Self::Analysis => schema_for!(Analysis),
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),
+            Self::Sensitivity => schema_for!(SensitivityResult),
+            Self::SensitivityItem => schema_for!(ItemRecord),
             Self::Vehicle => schema_for!(Vehicle),
             Self::Logs => schema_for!(Manifest),
             Self::Fleet => schema_for!(FleetTable),

@@ -134,6 +134,39 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
+    const X1: [f64; 12] = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0, 5.0, 8.0];
+    const X2: [f64; 12] = [2.0, 7.0, 1.0, 8.0, 2.0, 8.0, 1.0, 8.0, 2.0, 8.0, 4.0, 5.0];
+    const Y: [f64; 12] = [1.0, 4.0, 1.0, 4.0, 2.0, 9.0, 1.0, 3.0, 5.0, 6.0, 2.0, 3.5];
+
+    #[test]
+    fn coefficients_are_numpys() {
+        // rankdata of SciPy, lstsq of standardised ranks, and correlations of the residuals of each on the other.
+        let (found, r2) = coefficients(&[X1.to_vec(), X2.to_vec()], &Y, 1, 0);
+        let values = [
+            (found[0].regression, 0.096_309_79),
+            (found[1].regression, 0.732_380_53),
+            (found[0].partial, 0.143_168_114),
+            (found[1].partial, 0.739_953_251),
+            (r2, 0.565_629_581),
+        ];
+        for (found, expected) in values {
+            assert!((found.unwrap().value - expected).abs() < 1e-8, "{found:?} {expected}");
+        }
+        let of_x1 = found[0].regression.unwrap();
+        assert!(of_x1.low < 0.0 && of_x1.high > 0.0, "twelve campaigns do not tell: {of_x1:?}");
+    }
+
+    #[test]
+    fn a_factor_that_does_not_vary_has_no_coefficient_and_spoils_no_other() {
+        let scores = [X1.to_vec(), vec![7.0; 12], X2.to_vec()];
+        let (with, _) = coefficients(&scores, &Y, 1, 0);
+        let (without, _) = coefficients(&[X1.to_vec(), X2.to_vec()], &Y, 1, 0);
+        assert_eq!(with, [without[0], Coefficients::default(), without[1]]);
+        // A factor that is another one cannot be told from it.
+        let (twice, r2) = coefficients(&[X1.to_vec(), X1.to_vec()], &Y, 1, 0);
+        assert_eq!((twice, r2), (vec![Coefficients::default(); 2], None));
+    }
+
     #[test]
     fn equal_values_share_their_ranks() {
         assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::naming::named;
 use super::silent::Silent;
 use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::plain::Shown as _;
@@ -79,6 +80,7 @@ impl<'a> Campaigns<'a> {
         let _lock = FolderLock::take(root)?;
         let setup = self.study.setup_of(item).map_err(WorkflowError::Usage)?;
         let mission = planned(&setup, root)?;
+        let mut flown = None;
         for (flight, folder) in mission.flights.iter().zip(folders(root, &mission)) {
             let plan = &flight.plan;
             let lost = (setup.lost_share * plan.slots.len() as f64).round() as usize;
@@ -92,7 +94,18 @@ impl<'a> Campaigns<'a> {
                     item.seed,
                 )
             };
-            simulate(host, &folder, plan, &simulation)?;
+            let logs = simulate(host, &folder, plan, &simulation)?;
+            let why = logs.failed.first().cloned().unwrap_or_default();
+            if logs.unwritten {
+                return Err(FileError::new("write", root, std::io::Error::other(why)).into());
+            }
+            if logs.logs == 0 {
+                return Err(WorkflowError::Nothing(format!(
+                    "no drone could fly the {}: {why}",
+                    plan.name
+                )));
+            }
+            flown = flown.or(simulation.vehicle);
         }
         let work = simulated(root)?;
         let analysed = Analysing::begin(host, &work, &Settings::default(), None)?.run(false)?;
@@ -101,9 +114,18 @@ impl<'a> Campaigns<'a> {
             .iter()
             .filter(|flight| flight.purpose == Purpose::Measurement)
             .filter_map(|flight| flight.map.as_ref());
-        maps.filter_map(Outcome::of_map)
+        let outcome = maps
+            .filter_map(Outcome::of_map)
             .next()
-            .ok_or_else(|| WorkflowError::Nothing("the analysis gave no map".to_owned()))
+            .ok_or_else(|| WorkflowError::Nothing("the analysis gave no map".to_owned()))?;
+        let naming = match (&self.study.naming, mission.flights.first()) {
+            (Some(effect), Some(flight)) => {
+                let model = &flight.vehicle;
+                Some(named(root, effect, model, flown.as_ref().unwrap_or(model))?)
+            }
+            _ => None,
+        };
+        Ok(Outcome { naming, ..outcome })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Flight, evaluation and report of a sensitivity study: whole campaigns that differ in some factors.
 
 mod campaign;
+mod naming;
 mod silent;
 
 use std::path::{Path, PathBuf};

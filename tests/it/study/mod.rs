@@ -2,5 +2,6 @@
 
 mod result;
 mod resume;
+mod sensitivity;
 mod support;
 mod template;
