@@ -13,7 +13,7 @@ use crate::campaign::{CampaignError, FlightFolder, to_json};
 use crate::mission::plan::Purpose;
 use crate::mission::resolve::Mission;
 use crate::study::sensitivity::{Done, Item, NotDone, Outcome, SensitivityPlan, Setup};
-use crate::vehicle::{Vehicle, library};
+use crate::vehicle::Vehicle;
 use crate::workflow::analyze::{Analysing, Settings, simulated};
 use crate::workflow::error::{WorkflowError, with_reasons};
 use crate::workflow::host::Host;
@@ -139,7 +139,6 @@ fn planned(setup: &Setup, root: &Path) -> Result<Mission, WorkflowError> {
         Some(vehicle) => {
             let path = root.join("vehicle.toml");
             write_whole(&path, text_of(&vehicle)?.as_bytes())?;
-            library::load(&path.to_string_lossy())?;
             setup.mission(Some(&path.to_string_lossy()))?
         }
     };
