@@ -7,7 +7,8 @@ use std::path::Path;
 
 use divan::{Bencher, black_box};
 use updraft::study::sensitivity::{
-    Done, ITEM_SCHEMA, Item, ItemRecord, Level, NotDone, Outcome, SensitivityPlan, SensitivityWork, evaluate, item_path,
+    Done, ITEM_SCHEMA, Item, ItemRecord, Level, NotDone, Outcome, SensitivityPlan, SensitivityWork,
+    evaluate, item_path,
 };
 use updraft::workflow::sensitivity::write;
 

@@ -7,7 +7,9 @@ use crate::study::sensitivity::{Influence, OutcomeResult, SensitivityResult};
 
 use super::figures::sensitivity::figures;
 use super::fill::{common, fill};
-use super::sensitivity_terminal::{campaigns, capital, decimals, explained, in_order, numbers, spread};
+use super::sensitivity_terminal::{
+    campaigns, capital, decimals, explained, in_order, numbers, spread,
+};
 use super::text::{NONE, clean, fixed};
 use super::{Points, Provenance, Report, ReportError};
 

@@ -73,21 +73,33 @@ fn write_column(column: &mut ColumnWriter<'_>, index: usize, rows: &[Vec<Value>]
                 Value::Integer(number) => Some(*number),
                 _ => None,
             };
-            writer.write_batch(&values().filter_map(of).collect::<Vec<_>>(), Some(&present), None)?;
+            writer.write_batch(
+                &values().filter_map(of).collect::<Vec<_>>(),
+                Some(&present),
+                None,
+            )?;
         }
         ColumnWriter::DoubleColumnWriter(writer) => {
             let of = |value: &Value| match value {
                 Value::Number(number) => Some(*number),
                 _ => None,
             };
-            writer.write_batch(&values().filter_map(of).collect::<Vec<_>>(), Some(&present), None)?;
+            writer.write_batch(
+                &values().filter_map(of).collect::<Vec<_>>(),
+                Some(&present),
+                None,
+            )?;
         }
         ColumnWriter::ByteArrayColumnWriter(writer) => {
             let of = |value: &Value| match value {
                 Value::Text(text) => Some(ByteArray::from(text.as_str())),
                 _ => None,
             };
-            writer.write_batch(&values().filter_map(of).collect::<Vec<_>>(), Some(&present), None)?;
+            writer.write_batch(
+                &values().filter_map(of).collect::<Vec<_>>(),
+                Some(&present),
+                None,
+            )?;
         }
         _ => return Err(ParquetError::General(format!("column {index} has another type"))),
     }

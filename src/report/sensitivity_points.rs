@@ -20,9 +20,9 @@ impl Points {
     /// Points of the campaigns that have an outcome.
     pub fn of(study: &SensitivityPlan, drawn: &Drawn<'_>, rows: &[Option<Row>]) -> Self {
         let finished = || {
-            rows.iter().enumerate().filter_map(|(index, row)| {
-                Some((index, row.as_ref()?.result.as_ref().ok()?))
-            })
+            rows.iter()
+                .enumerate()
+                .filter_map(|(index, row)| Some((index, row.as_ref()?.result.as_ref().ok()?)))
         };
         let of = finished().count();
         let mut points = Self {

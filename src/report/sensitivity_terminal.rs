@@ -77,11 +77,8 @@ pub fn sensitivity_summary(study: &SensitivityResult, width: usize, color: bool)
 
 /// How many campaigns there are, in words.
 pub(super) fn campaigns(study: &SensitivityResult) -> String {
-    let open = if study.open > 0 {
-        format!(", {} still to be flown", study.open)
-    } else {
-        String::new()
-    };
+    let open =
+        if study.open > 0 { format!(", {} still to be flown", study.open) } else { String::new() };
     format!(
         "{} of {} ({}) of {}, {}{open}, seed {}",
         study.finished,
@@ -101,13 +98,11 @@ pub(super) fn spread(outcome: &OutcomeResult) -> String {
     let unit = if outcome.unit.is_empty() { String::new() } else { format!(" {}", outcome.unit) };
     let number = |value: f64| fixed(value, decimals(sd));
     let range = match &outcome.quantiles[..] {
-        [least, low, _, median, _, high, most] => format!(
-            "; median {}, 90 % between {} and {}, all between {} and {}",
+        [_, low, _, median, _, high, _] => format!(
+            "; median {}, 90 % between {} and {}",
             number(*median),
             number(*low),
-            number(*high),
-            number(*least),
-            number(*most)
+            number(*high)
         ),
         _ => String::new(),
     };
@@ -136,17 +131,13 @@ pub(super) fn numbers(found: &Influence, is_sobol: bool) -> (String, String) {
     let share = |value: Option<Uncertain>| {
         value.map_or_else(
             || NONE.to_owned(),
-            |of| {
-                format!("{} [{}, {}]", fixed(of.value, 2), fixed(of.low, 2), fixed(of.high, 2))
-            },
+            |of| format!("{} [{}, {}]", fixed(of.value, 2), fixed(of.low, 2), fixed(of.high, 2)),
         )
     };
     let coefficient = |value: Option<Uncertain>| {
         value.map_or_else(
             || NONE.to_owned(),
-            |of| {
-                format!("{} [{}, {}]", signed(of.value, 2), signed(of.low, 2), signed(of.high, 2))
-            },
+            |of| format!("{} [{}, {}]", signed(of.value, 2), signed(of.low, 2), signed(of.high, 2)),
         )
     };
     if is_sobol {
@@ -161,7 +152,9 @@ pub(super) fn explained(outcome: &OutcomeResult, is_sobol: bool) -> Option<Strin
     let of = outcome.explained?;
     let interval = format!("{} [{}, {}]", fixed(of.value, 2), fixed(of.low, 2), fixed(of.high, 2));
     Some(if is_sobol {
-        format!("Sum of the first orders {interval}; what is missing to 1 is the work of several together")
+        format!(
+            "Sum of the first orders {interval}; what is missing to 1 is the work of several together"
+        )
     } else {
         format!("R² of the rank regression {interval}; the rest is chance, or not monotonic")
     })

@@ -374,8 +374,8 @@ fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle),
         })?;
         overrides.push(Override::new("vehicle", name));
     }
-    let mission =
-        resolve(&place.beside(typed.template.get_ref()), &overrides).map_err(|error| -> StudyError {
+    let mission = resolve(&place.beside(typed.template.get_ref()), &overrides).map_err(
+        |error| -> StudyError {
             match &error {
                 MissionError::NoTemplate { .. } => {
                     place.error(&typed.template, error.to_string()).into()
@@ -392,7 +392,8 @@ fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle),
                 }
                 _ => error.into(),
             }
-        })?;
+        },
+    )?;
     let mut flights = mission.flights.into_iter();
     match (flights.next(), flights.next()) {
         (Some(flight), None) => Ok((flight.plan, flight.vehicle)),

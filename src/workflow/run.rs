@@ -219,8 +219,7 @@ pub(super) fn kept(plan: &Plan, seed: u64, lost: usize) -> Option<SlotSet> {
     }
     let mut rng = stream(seed, plan.purpose as u64, Chance::Losses);
     let gone = rand::seq::index::sample(&mut rng, slots.len(), lost);
-    let kept =
-        slots.into_iter().enumerate().filter(|(index, _)| !gone.iter().any(|i| i == *index));
+    let kept = slots.into_iter().enumerate().filter(|(index, _)| !gone.iter().any(|i| i == *index));
     Some(kept.map(|(_, slot)| slot).collect())
 }
 

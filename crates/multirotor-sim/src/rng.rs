@@ -63,7 +63,7 @@ mod tests {
             (Purpose::Link, 13_064_133_372_313_075_978),
             (Purpose::Losses, 15_892_548_217_100_850_607),
             (Purpose::Hidden, 2_891_771_322_711_400_073),
-            (Purpose::Design, 0),
+            (Purpose::Design, 15_551_438_536_731_458_224),
         ];
         let drawn = purposes.map(|(purpose, _)| (purpose, stream(7, 3, purpose).next_u64()));
         assert_eq!(drawn, purposes);

@@ -62,8 +62,7 @@ fn influences(study: &SensitivityResult) -> Option<Figure> {
     let sheet_rows = shown.len().div_ceil(COLUMNS);
     let mut drawing = Drawing::new(WIDTH, sheet_rows as f64 * size[1] + 24.0);
     for (index, outcome) in shown.iter().enumerate() {
-        let corner =
-            [(index % COLUMNS) as f64 * size[0], (index / COLUMNS) as f64 * size[1]];
+        let corner = [(index % COLUMNS) as f64 * size[0], (index / COLUMNS) as f64 * size[1]];
         panel(&mut drawing, outcome, corner, size, is_sobol);
     }
     legend(&mut drawing, sheet_rows as f64 * size[1] + 4.0, is_sobol);
@@ -101,7 +100,8 @@ fn panel(
 ) {
     let order = in_order(outcome);
     let ends = |of: &Option<Uncertain>| of.map_or([0.0, 0.0], |of| [of.low, of.high]);
-    let all = || order.iter().flat_map(|f| [f.first, f.total, f.regression]).flat_map(|of| ends(&of));
+    let all =
+        || order.iter().flat_map(|f| [f.first, f.total, f.regression]).flat_map(|of| ends(&of));
     let (least, most) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
     let (low, high) = if is_sobol {
         // An interval far below 0 or above 1 says no more than that nothing is known.
@@ -126,7 +126,7 @@ fn panel(
         _ => String::new(),
     };
     drawing.text([left + 6.0, top + 38.0], &note, style(12.0, MUTED, Anchor::Start, false), 0.0);
-    let step = if high - low > 1.6 { 0.5 } else { 0.25 };
+    let step = if high - low > 1.3 { 0.5 } else { 0.25 };
     let first = (low / step).ceil() as i64;
     for tick in (first..).map(|k| k as f64 * step).take_while(|tick| *tick <= high + 1e-9) {
         let x = place(tick);
@@ -138,12 +138,7 @@ fn panel(
         let middle = top + 54.0 + ROW * (row as f64 + 0.5);
         let name = shortened(&found.factor, LETTERS);
         drawing.open(&found.factor);
-        drawing.text(
-            [from - 8.0, middle + 4.0],
-            &name,
-            style(12.5, INK, Anchor::End, false),
-            0.0,
-        );
+        drawing.text([from - 8.0, middle + 4.0], &name, style(12.5, INK, Anchor::End, false), 0.0);
         drawing.close();
         let bars: Vec<(Option<Uncertain>, bool, f64)> = if is_sobol {
             vec![(found.first, true, -6.0), (found.total, false, 6.0)]
@@ -203,7 +198,7 @@ fn scattered(
     let unit = if outcome.unit.is_empty() { String::new() } else { format!(" ({})", outcome.unit) };
     let label = format!("{}{unit}", outcome.title);
     let spread = outcome.sd.unwrap_or(0.0).max(1e-3);
-    let y = Axis::around(&shorter(&label, 34), known.iter().copied(), spread);
+    let y = Axis::around(&shortened(&label, 34), known.iter().copied(), spread);
     let rows = points.factors.len().div_ceil(COLUMNS);
     let mut sheet = Sheet::new(WIDTH, rows as f64 * PANEL[1]);
     for (place, (factor, levels)) in study.factors.iter().zip(&points.factors).enumerate() {
@@ -239,25 +234,28 @@ fn scattered(
     })
 }
 
-fn shorter(text: &str, letters: usize) -> String {
-    shortened(text, letters)
-}
-
 fn of_factor(factor: &FactorResult, points: &[(f64, f64)], y: &Axis) -> Panel {
     let unit = if factor.unit.is_empty() { String::new() } else { format!(" ({})", factor.unit) };
     let label = if factor.words.is_empty() {
         format!("{}{unit}", factor.name)
     } else {
-        let words: Vec<String> =
-            factor.words.iter().enumerate().map(|(place, word)| format!("{place}: {word}")).collect();
+        let words: Vec<String> = factor
+            .words
+            .iter()
+            .enumerate()
+            .map(|(place, word)| format!("{place}: {word}"))
+            .collect();
         shortened(&words.join(", "), 48)
     };
     let mut x = Axis::around(&label, points.iter().map(|point| point.0), 1e-3);
     let least = points.iter().map(|point| point.0).fold(f64::INFINITY, f64::min);
     if factor.words.is_empty() {
-        // No number below 0 where there is none.
+        // No number below 0 where there is none, and no half drones.
         if least >= 0.0 {
             x.min = x.min.max(0.0);
+        }
+        if points.iter().all(|point| point.0.fract() == 0.0) {
+            x.step = x.step.max(1.0);
         }
     } else {
         x.step = 1.0;
@@ -272,10 +270,8 @@ fn of_factor(factor: &FactorResult, points: &[(f64, f64)], y: &Axis) -> Panel {
     if is_log {
         panel.logarithmic_x();
     }
-    let marks: Vec<Mark> = points
-        .iter()
-        .map(|(x, y)| Mark { x: *x, y: *y, x_error: 0.0, y_error: 0.0 })
-        .collect();
+    let marks: Vec<Mark> =
+        points.iter().map(|(x, y)| Mark { x: *x, y: *y, x_error: 0.0, y_error: 0.0 }).collect();
     panel.marks(&marks, BLUE, if points.len() > 300 { 1.6 } else { 2.6 }, MarkerShape::Circle);
     panel.line(&medians(points), VERMILLION, 2.0, "");
     panel

@@ -65,7 +65,9 @@ pub fn evaluate(study: &SensitivityPlan, seed: u64, gathered: &Gathered) -> Sens
         lost,
         open: rows.iter().filter(|row| row.is_none()).count(),
         outcomes: outcomes
-            .map(|(number, column)| outcome_result(study, seed, number as u64, column, rows, &scores))
+            .map(|(number, column)| {
+                outcome_result(study, seed, number as u64, column, rows, &scores)
+            })
             .collect(),
         factors,
         lost_reasons: lost_reasons(rows),

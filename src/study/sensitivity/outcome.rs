@@ -147,7 +147,9 @@ impl Outcome {
             .drones
             .iter()
             .filter(|drone| drone.truth_mps.is_some())
-            .flat_map(|drone| if posterior.is_some() { of_posterior(drone) } else { of_alone(drone) })
+            .flat_map(
+                |drone| if posterior.is_some() { of_posterior(drone) } else { of_alone(drone) },
+            )
             .collect();
         let TruthCheck { rms_mps, zero_rms_mps, .. } = *check;
         let over = |value: f64, by: f64| (by > 0.0).then_some(value / by);

@@ -113,9 +113,8 @@ mod tests {
     #[test]
     fn ishigamis_indices_are_inside_their_intervals() {
         // Ishigami and Homma 1990 with a = 7, b = 0.1: V = a²/8 + bπ⁴/5 + b²π⁸/18 + 1/2.
-        let ishigami = |x: &[f64]| {
-            x[0].sin() + 7.0 * x[1].sin().powi(2) + 0.1 * x[2].powi(4) * x[0].sin()
-        };
+        let ishigami =
+            |x: &[f64]| x[0].sin() + 7.0 * x[1].sin().powi(2) + 0.1 * x[2].powi(4) * x[0].sin();
         let found = of_function(&factors(3, -PI, PI), 2048, &ishigami);
         let truth = [(0.3139, 0.5576), (0.4424, 0.4424), (0.0, 0.2437)];
         for (found, (first, total)) in found.iter().zip(truth) {

@@ -257,9 +257,8 @@ fn set_component(
             keys.split(',').filter(|pair| !pair.is_empty()).filter(is_other).collect();
         let new = format!("{key}={number}");
         pairs.push(&new);
-        *spec = format!("{kind}:{}", pairs.join(","))
-            .parse()
-            .map_err(|error| format!("{error}"))?;
+        *spec =
+            format!("{kind}:{}", pairs.join(",")).parse().map_err(|error| format!("{error}"))?;
         found = true;
     }
     Ok(found)

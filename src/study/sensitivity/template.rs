@@ -11,13 +11,12 @@ use toml::{Spanned, Value};
 use super::design::{Design, Drawn, Item, Seeds};
 use super::factor::{AirTarget, Factor, Level, Levels, Range, Target};
 use super::key::fingerprint;
-use super::outcome::{OUTCOMES, USUAL, OutcomeColumn, outcome_column};
+use super::outcome::{OUTCOMES, OutcomeColumn, USUAL, outcome_column};
 use super::setup::{Airs, Setup};
 use crate::base::file::read_whole;
 use crate::base::parse;
 use crate::effects;
 use crate::mission::error::TemplateError;
-use crate::mission::resolve::Override;
 use crate::mission::template::first_line;
 use crate::sim::air::spec::{self, AirSpec};
 use crate::study::StudyError;
@@ -208,16 +207,7 @@ impl SensitivityPlan {
         let naming = naming(&place, file.naming.as_ref())?;
         let fingerprint = fingerprint(&setup, &factors, naming.as_deref())
             .map_err(|reason| place.error(&file.campaign, reason))?;
-        Ok(Self {
-            title: file.title,
-            factors,
-            design,
-            seeds,
-            naming,
-            outcomes,
-            setup,
-            fingerprint,
-        })
+        Ok(Self { title: file.title, factors, design, seeds, naming, outcomes, setup, fingerprint })
     }
 
     /// Draws the campaigns.
@@ -244,11 +234,7 @@ fn seeds(place: &Place<'_>, given: Option<&Spanned<String>>) -> Result<Seeds, Te
     }
 }
 
-fn design(
-    place: &Place<'_>,
-    file: &File,
-    factors: &[Factor],
-) -> Result<Design, TemplateError> {
+fn design(place: &Place<'_>, file: &File, factors: &[Factor]) -> Result<Design, TemplateError> {
     let count = |most: i64| {
         let Some(samples) = &file.samples else {
             return Err(place.error(&file.design, "the number of samples is missing"));
@@ -281,14 +267,13 @@ fn design(
                         .with_help("give levels = 5 for equal steps, or values = [...]"));
                 }
             }
-            let repeats = file.repeats.as_ref().map_or(Ok(1), |repeats| {
-                match *repeats.get_ref() {
+            let repeats =
+                file.repeats.as_ref().map_or(Ok(1), |repeats| match *repeats.get_ref() {
                     count @ 1..=100_000 => Ok(count as usize),
                     count => Err(place
                         .error(repeats, format!("the number of repeats cannot be {count}"))
                         .with_help("allowed: 1 to 100000")),
-                }
-            })?;
+                })?;
             Ok(Design::Grid { repeats })
         }
         "latin-hypercube" => {
@@ -301,10 +286,7 @@ fn design(
     }
 }
 
-fn outcomes(
-    place: &Place<'_>,
-    file: &File,
-) -> Result<Vec<&'static OutcomeColumn>, TemplateError> {
+fn outcomes(place: &Place<'_>, file: &File) -> Result<Vec<&'static OutcomeColumn>, TemplateError> {
     let Some(given) = &file.outcomes else {
         let named = file.naming.is_some().then_some("named");
         return Ok(USUAL.iter().copied().chain(named).filter_map(outcome_column).collect());
@@ -354,7 +336,6 @@ fn setup(place: &Place<'_>, file: &File) -> Result<Setup, TemplateError> {
         Some(given) => airs(given)?,
         None => spec::load(FIELD_DAY).unwrap_or_default(),
     };
-    let overrides = overrides.into_iter().map(|item: Override| item).collect();
     Ok(Setup {
         campaign: place.beside(file.campaign.get_ref()),
         vehicle: file.vehicle.as_ref().map(|name| place.beside(name.get_ref())),
@@ -391,8 +372,13 @@ fn factors(place: &Place<'_>, file: &File) -> Result<Vec<Factor>, TemplateError>
         }
         let reserved = ["item", "seed", "lost", "warnings", "naming", "chance"];
         if reserved.contains(&name) || outcome_column(name).is_some() {
-            return Err(place.error(&one.name, format!("a factor cannot be named {name}: \
-                 the tables have that column")));
+            return Err(place.error(
+                &one.name,
+                format!(
+                    "a factor cannot be named {name}: \
+                 the tables have that column"
+                ),
+            ));
         }
         if factors.iter().any(|other| other.name == name) {
             return Err(place.error(&one.name, format!("two factors are named {name}")));
@@ -456,8 +442,9 @@ fn target(place: &Place<'_>, one: &FactorFile) -> Result<Target, TemplateError> 
         _ => return Err(unknown(text)),
     };
     if one.known && !matches!(found, Target::Effect { .. } | Target::Parameter { .. }) {
-        return Err(place
-            .error(&one.drives, "only effects and numbers of a vehicle can be known or not"));
+        return Err(
+            place.error(&one.drives, "only effects and numbers of a vehicle can be known or not")
+        );
     }
     Ok(found)
 }
@@ -476,9 +463,10 @@ fn levels(place: &Place<'_>, one: &FactorFile) -> Result<Levels, TemplateError> 
             if list.len() < 2 {
                 return Err(place.error(values, "a factor needs two values or more"));
             }
-            let twice = list.iter().enumerate().any(|(index, value)| {
-                list.iter().take(index).any(|other| other == value)
-            });
+            let twice = list
+                .iter()
+                .enumerate()
+                .any(|(index, value)| list.iter().take(index).any(|other| other == value));
             if twice {
                 return Err(place.error(values, "a value is there twice"));
             }

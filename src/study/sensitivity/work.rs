@@ -95,9 +95,8 @@ impl<'a> SensitivityWork<'a> {
     }
 
     fn open_indices(&self, takes: &(dyn Fn(usize) -> bool + Sync)) -> Vec<usize> {
-        let is_open = |(index, row): (usize, &Option<Row>)| {
-            (row.is_none() && takes(index)).then_some(index)
-        };
+        let is_open =
+            |(index, row): (usize, &Option<Row>)| (row.is_none() && takes(index)).then_some(index);
         self.rows.iter().enumerate().filter_map(is_open).collect()
     }
 

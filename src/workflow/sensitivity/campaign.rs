@@ -58,13 +58,15 @@ impl<'a> Campaigns<'a> {
             Err(WorkflowError::Interrupted | WorkflowError::Stopped(_)) => {
                 return Err(NotDone::Stopped);
             }
-            Err(WorkflowError::File(error) | WorkflowError::Campaign(CampaignError::File(error))) => {
+            Err(
+                WorkflowError::File(error) | WorkflowError::Campaign(CampaignError::File(error)),
+            ) => {
                 return Err(NotDone::File(error));
             }
             // Where it was flown says nothing of the campaign.
-            Err(error) => {
-                Err(with_reasons(&error).replace(&format!("{}/", root.shown()), "").replace('\n', " "))
-            }
+            Err(error) => Err(with_reasons(&error)
+                .replace(&format!("{}/", root.shown()), "")
+                .replace('\n', " ")),
         };
         let place = format!("{}/", root.shown());
         let mut warnings = silent.into_heard();
@@ -143,9 +145,14 @@ fn planned(setup: &Setup, root: &Path) -> Result<Mission, WorkflowError> {
         }
     };
     for (flight, folder) in mission.flights.iter().zip(folders(root, &mission)) {
-        write_flight(&folder, &flight.template_text, &flight.vehicle, &to_json(&flight.plan).map_err(
-            |error| WorkflowError::Failed(format!("failed to write the plan: {error}")),
-        )?)?;
+        write_flight(
+            &folder,
+            &flight.template_text,
+            &flight.vehicle,
+            &to_json(&flight.plan).map_err(|error| {
+                WorkflowError::Failed(format!("failed to write the plan: {error}"))
+            })?,
+        )?;
     }
     write_index(root, &mission)?;
     Ok(mission)

@@ -76,7 +76,11 @@ pub fn evaluated(
 ) -> SensitivityResult {
     let result = evaluate(study, seed, gathered);
     for lost in &result.lost_reasons {
-        host.warn(&format!("{} lost: {}", super::words::count(lost.campaigns, "campaign"), lost.reason));
+        host.warn(&format!(
+            "{} lost: {}",
+            super::words::count(lost.campaigns, "campaign"),
+            lost.reason
+        ));
     }
     result
 }
