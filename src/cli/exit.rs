@@ -59,7 +59,7 @@ pub fn exit_of(error: &CommandError) -> Exit {
             _ => Exit::Usage,
         },
         E::Study(error) => match &**error {
-            StudyError::Record { .. } => Exit::Failed,
+            StudyError::Record { .. } | StudyError::Threads { .. } => Exit::Failed,
             StudyError::NoStudy { name } => of_name(name),
             StudyError::NoReference { .. } => Exit::Nothing,
             _ => Exit::Usage,

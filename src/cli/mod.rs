@@ -22,6 +22,7 @@ mod physics;
 mod plan;
 mod progress;
 mod run;
+mod sensitivity;
 mod shard_args;
 mod show_text;
 mod signals;

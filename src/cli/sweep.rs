@@ -1,18 +1,22 @@
 //! `updraft sweep`: a study flown, evaluated and reported.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::sensitivity::{self, Asked};
 use super::shard_args::{self, ShardArgs};
 use crate::base::plain::Shown as _;
 use crate::report;
 use crate::study::result::StudyResult;
-use crate::study::{Cell, Settings, StudyPlan, Work, cells_folder};
+use crate::study::sensitivity::items_folder;
+use crate::study::{AnyStudy, Cell, Settings, StudyPlan, Work, cells_folder};
 use crate::workflow::clock::Stopwatch;
+use crate::workflow::cluster::Results;
+use crate::workflow::sensitivity::Settings as CampaignSettings;
 use crate::workflow::study::{BUILT_IN, evaluated, fly, join, refuse_campaign, shard_done, write};
 
 /// Width of the terminal summary, columns: at most, and at least.
@@ -26,13 +30,16 @@ const MIN_WIDTH: usize = 60;
   updraft sweep my-study.toml -o my-study --seed 7
   updraft sweep --keep-logs
   updraft sweep large.toml -o large --shard 3/10
+  updraft sweep sensitivity -o what-decides           # whole campaigns: what decides the map's error
 
 Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and
 u0 held fixed at those of still air, and writes study.json and report/index.html. Finished flights
 are kept in cells/: running the same command again resumes an interrupted study, and after a change
-to the study only what changed is flown. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
+to the study only what changed is flown. A sensitivity study (schema updraft.sensitivity/1, built in
+as `sensitivity`) flies whole campaigns that differ in some factors, keeps their outcomes in items/, and
+writes results.parquet, results.csv, sensitivity.json and the report. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
 pub(super) struct SweepArgs {
-    /// Study: a file or the built-in name
+    /// Study: a file, or a built-in name (study, sensitivity)
     #[arg(default_value = BUILT_IN)]
     study: String,
     /// Folder for the study's flights and results
@@ -44,12 +51,16 @@ pub(super) struct SweepArgs {
     /// Flights at the same time [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Keep the log of every flight in logs/
+    /// Keep the log of every flight in logs/ (of a sensitivity study: every campaign's folder in work/)
     #[arg(long)]
     keep_logs: bool,
     /// Fly finished flights again
     #[arg(long, conflicts_with_all = ["shard", "no_fly"])]
     force: bool,
+    /// Folder in which the campaigns of a sensitivity study are flown, best on a disk of this machine
+    /// alone [default: work/ in the study's folder]
+    #[arg(long, value_name = "FOLDER")]
+    scratch: Option<PathBuf>,
     #[command(flatten)]
     sharing: ShardArgs,
 }
@@ -65,25 +76,58 @@ struct SweepOutput<'a> {
 }
 
 impl SweepArgs {
-    /// Folder of the study, and the files of its flights.
-    pub(super) fn results(&self) -> Result<(PathBuf, Vec<PathBuf>), CommandError> {
-        let study = StudyPlan::load(&self.study)?;
-        let folder = cells_folder(&self.output);
-        let file = |cell: &Cell| folder.join(format!("{}.json", cell.name()));
-        Ok((self.output.clone(), study.cells().iter().map(file).collect()))
+    /// Folder of the study, the files of its items, and whether these are made in a folder that can be chosen
+    /// and was not.
+    pub(super) fn results(&self, cwd: &Path) -> Result<(PathBuf, Results, bool), CommandError> {
+        let folder = self.output.clone();
+        let results = match AnyStudy::load(&self.study)? {
+            AnyStudy::Ladder(study) => {
+                let cells = cwd.join(cells_folder(&folder));
+                let file = |cell: &Cell| cells.join(format!("{}.json", cell.name()));
+                Results::Named { files: study.cells().iter().map(file).collect() }
+            }
+            AnyStudy::Sensitivity(study) => Results::Numbered {
+                folder: cwd.join(items_folder(&folder)),
+                digits: 6,
+                suffix: ".json".to_owned(),
+                count: study.drawn(self.seed).len(),
+                per_folder: Some(1000),
+            },
+        };
+        let has_scratch = matches!(results, Results::Numbered { .. }) && self.scratch.is_none();
+        Ok((folder, results, has_scratch))
     }
 }
 
 pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start(context);
-    let study = StudyPlan::load(&args.study)?;
+    let study = AnyStudy::load(&args.study)?;
     refuse_campaign(&args.output)?;
     let share = args.sharing.share();
     // Shards share the folder, on file systems that may have no locks.
     let _lock = share.shard.is_none().then(|| context.lock(&args.output)).transpose()?;
+    match study {
+        AnyStudy::Ladder(study) => ladder(context, args, &study),
+        AnyStudy::Sensitivity(study) => {
+            let (keep, jobs, scratch) = (args.keep_logs, args.jobs, args.scratch.clone());
+            let settings = CampaignSettings { seed: args.seed, keep, jobs, scratch };
+            let (output, force) = (args.output.clone(), args.force);
+            let asked = Asked { output, force, settings, command: command(args), share };
+            sensitivity::run(context, &study, &asked, width(context))
+        }
+    }
+}
+
+/// Columns of the terminal summary.
+fn width(context: &Context) -> usize {
+    context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH))
+}
+
+fn ladder(context: &Context, args: &SweepArgs, study: &StudyPlan) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start(context);
+    let share = args.sharing.share();
     let settings =
         Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force, share };
-    let work = Work::open(&study, &args.output, settings)?;
+    let work = Work::open(study, &args.output, settings)?;
     join(context, &args.output, &work, share)?;
     let (total, open) = (work.total(), work.open_flights());
     if open < total {
@@ -95,10 +139,9 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
         return shard_args::report(context, &done, "flight");
     }
     let flying = watch.to_string();
-    let result = evaluated(context, &study, args.seed, &flown)?;
+    let result = evaluated(context, study, args.seed, &flown)?;
     if !context.json {
-        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
-        context.print(&report::study_summary(&result, width, context.color))?;
+        context.print(&report::study_summary(&result, width(context), context.color))?;
     }
     let page = write(&args.output, command(args), args.seed, &result)?;
     if context.json {

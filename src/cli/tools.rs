@@ -25,6 +25,7 @@ use crate::gap::next::Next;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
+use crate::study::sensitivity::{ItemRecord, SensitivityResult};
 use crate::vehicle::Vehicle;
 use crate::workflow::analyze::each::AnalysisRecord;
 use crate::workflow::archive::output::ArchiveOutput;
@@ -63,6 +64,10 @@ pub enum Format {
     Study,
     /// a finished flight of a study
     Cell,
+    /// sensitivity.json of a sensitivity study
+    Sensitivity,
+    /// a finished campaign of a sensitivity study
+    SensitivityItem,
     /// vehicle files
     Vehicle,
     /// logs/manifest.json
@@ -120,6 +125,8 @@ impl Format {
             Self::Analysis => schema_for!(Analysis),
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),
+            Self::Sensitivity => schema_for!(SensitivityResult),
+            Self::SensitivityItem => schema_for!(ItemRecord),
             Self::Vehicle => schema_for!(Vehicle),
             Self::Logs => schema_for!(Manifest),
             Self::Fleet => schema_for!(FleetTable),

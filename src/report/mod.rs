@@ -41,6 +41,11 @@ mod posterior;
 mod posterior_grid;
 mod raster;
 mod scales;
+mod sensitivity_page;
+#[cfg(feature = "parquet")]
+pub mod sensitivity_parquet;
+mod sensitivity_points;
+mod sensitivity_terminal;
 mod shapes;
 mod sheet;
 mod statistics_lines;
@@ -62,6 +67,9 @@ use crate::study::result::StudyResult;
 
 pub use gap_page::render_gap;
 pub use gap_terminal::gap_summary;
+pub use sensitivity_page::render_sensitivity;
+pub use sensitivity_points::Points;
+pub use sensitivity_terminal::sensitivity_summary;
 pub use study_page::render_study;
 pub use study_terminal::study_summary;
 pub use terminal::terminal_summary;

@@ -25,7 +25,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The name is neither a file nor a built-in study.
-    #[error("there is no study {}; built in is study.toml", plain(name))]
+    #[error("there is no study {}; built in are study.toml and sensitivity.toml", plain(name))]
     NoStudy {
         /// Name of the study, as asked for.
         name: String,
@@ -38,6 +38,12 @@ pub enum StudyError {
         /// Reason given by the serialiser.
         #[source]
         source: serde_json::Error,
+    },
+    /// Threads could not be started.
+    #[error("failed to start threads: {reason}")]
+    Threads {
+        /// Reason given by the operating system.
+        reason: String,
     },
     /// The user asked to stop.
     #[error("the study was stopped; finished flights are kept")]

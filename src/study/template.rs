@@ -23,7 +23,7 @@ use crate::vehicle::{Vehicle, VehicleError, library};
 pub const STUDY_TEMPLATE_SCHEMA: &str = "updraft.study/1";
 
 /// Largest study file that is read, bytes.
-const MAX_STUDY_BYTES: u64 = 4 << 20;
+pub(super) const MAX_STUDY_BYTES: u64 = 4 << 20;
 /// Most flights of a study.
 const MAX_FLIGHTS: usize = 100_000;
 /// Fewest updrafts that a correlation says anything about.
@@ -224,13 +224,21 @@ impl StudyPlan {
 }
 
 /// Where a message points.
-struct Place<'a> {
-    path: &'a str,
-    text: &'a str,
+pub(super) struct Place<'a> {
+    pub(super) path: &'a str,
+    pub(super) text: &'a str,
 }
 
 impl Place<'_> {
-    fn error<T>(&self, value: &Spanned<T>, message: impl Into<String>) -> TemplateError {
+    /// The path of a file beside the study's; a name that is none, from where the program runs or built in.
+    pub(super) fn beside(&self, name: &str) -> String {
+        let folder = Path::new(self.path).parent().unwrap_or(Path::new(""));
+        let path = folder.join(name);
+        if path.is_file() { path.to_string_lossy().into_owned() } else { name.to_owned() }
+    }
+
+    /// An error at the place of a value.
+    pub(super) fn error<T>(&self, value: &Spanned<T>, message: impl Into<String>) -> TemplateError {
         let span = value.span();
         TemplateError::new(self.path, self.text, (!span.is_empty()).then_some(span), message)
     }
@@ -354,26 +362,20 @@ fn conditions(winds: &[f64], directions: &[f64]) -> Vec<Condition> {
 
 /// The plan and the vehicle that the study flies.
 fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle), StudyError> {
-    let folder = Path::new(place.path).parent().unwrap_or(Path::new(""));
-    // Beside the study's file, else from where the program runs, else built in.
-    let beside = |name: &str| {
-        let path = folder.join(name);
-        if path.is_file() { path.to_string_lossy().into_owned() } else { name.to_owned() }
-    };
     let mut overrides = Vec::new();
     for (key, value) in &typed.set {
         flatten(key, value.get_ref(), &mut overrides);
     }
     if let Some(vehicle) = &typed.vehicle {
-        let name = beside(vehicle.get_ref());
+        let name = place.beside(vehicle.get_ref());
         library::load(&name).map_err(|error| match error {
             VehicleError::Unknown { .. } => place.error(vehicle, error.to_string()).into(),
             other => StudyError::Vehicle(Box::new(other)),
         })?;
         overrides.push(Override::new("vehicle", name));
     }
-    let mission =
-        resolve(&beside(typed.template.get_ref()), &overrides).map_err(|error| -> StudyError {
+    let mission = resolve(&place.beside(typed.template.get_ref()), &overrides).map_err(
+        |error| -> StudyError {
             match &error {
                 MissionError::NoTemplate { .. } => {
                     place.error(&typed.template, error.to_string()).into()
@@ -390,7 +392,8 @@ fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle),
                 }
                 _ => error.into(),
             }
-        })?;
+        },
+    )?;
     let mut flights = mission.flights.into_iter();
     match (flights.next(), flights.next()) {
         (Some(flight), None) => Ok((flight.plan, flight.vehicle)),
@@ -399,7 +402,7 @@ fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle),
 }
 
 /// `grid.rows = 1` without quotes is a table in a table: its keys are joined again.
-fn flatten(key: &str, value: &Value, overrides: &mut Vec<Override>) {
+pub(super) fn flatten(key: &str, value: &Value, overrides: &mut Vec<Override>) {
     match value {
         Value::Table(table) => {
             for (inner, value) in table {

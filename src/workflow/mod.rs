@@ -51,6 +51,7 @@ pub mod physics;
 pub mod plan;
 mod provenance;
 pub mod run;
+pub mod sensitivity;
 pub mod share;
 mod shared_clock;
 pub mod shows;

@@ -200,22 +200,27 @@ impl Run {
 
     /// The slots whose logs are not lost.
     fn kept(&self, plan: &Plan) -> Result<SlotSet, WorkflowError> {
-        let slots: Vec<u16> = plan.slots.iter().map(|slot| slot.slot).collect();
-        let lost = usize::from(self.lose);
-        if lost >= slots.len() {
-            return Err(WorkflowError::Usage(format!(
-                "--lose {lost} leaves no log of the {} drones of {}",
-                slots.len(),
+        kept(plan, self.simulation.seed, usize::from(self.lose)).ok_or_else(|| {
+            WorkflowError::Usage(format!(
+                "--lose {} leaves no log of the {} drones of {}",
+                self.lose,
+                plan.slots.len(),
                 plan.name
-            )));
-        }
-        let flight = plan.purpose as u64;
-        let mut rng = stream(self.simulation.seed, flight, Chance::Losses);
-        let gone = rand::seq::index::sample(&mut rng, slots.len(), lost);
-        let kept =
-            slots.into_iter().enumerate().filter(|(index, _)| !gone.iter().any(|i| i == *index));
-        Ok(kept.map(|(_, slot)| slot).collect())
+            ))
+        })
     }
+}
+
+/// Slots of a flight whose logs are not lost, chosen by the seed; `None` if none is left.
+pub(super) fn kept(plan: &Plan, seed: u64, lost: usize) -> Option<SlotSet> {
+    let slots: Vec<u16> = plan.slots.iter().map(|slot| slot.slot).collect();
+    if lost >= slots.len() {
+        return None;
+    }
+    let mut rng = stream(seed, plan.purpose as u64, Chance::Losses);
+    let gone = rand::seq::index::sample(&mut rng, slots.len(), lost);
+    let kept = slots.into_iter().enumerate().filter(|(index, _)| !gone.iter().any(|i| i == *index));
+    Some(kept.map(|(_, slot)| slot).collect())
 }
 
 #[cfg(test)]

@@ -35,6 +35,8 @@ pub enum Purpose {
     Losses = 7,
     /// Choice of the hidden physics of a blind flight.
     Hidden = 8,
+    /// Campaigns of a study: the levels of its factors.
+    Design = 9,
 }
 
 /// The random stream of one drone and purpose: the generator PCG XSL RR 128/64 (O'Neill 2014), of which
@@ -61,6 +63,7 @@ mod tests {
             (Purpose::Link, 13_064_133_372_313_075_978),
             (Purpose::Losses, 15_892_548_217_100_850_607),
             (Purpose::Hidden, 2_891_771_322_711_400_073),
+            (Purpose::Design, 15_551_438_536_731_458_224),
         ];
         let drawn = purposes.map(|(purpose, _)| (purpose, stream(7, 3, purpose).next_u64()));
         assert_eq!(drawn, purposes);

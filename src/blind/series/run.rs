@@ -19,6 +19,8 @@ use crate::campaign::read_json;
 
 /// Name and version of the format of one finished flight.
 pub const RESULT_SCHEMA: &str = "updraft.blind-flight/1";
+/// File of the verdict in the folder of a flight.
+const VERDICT: &str = "verdict.json";
 
 /// One finished flight: `flights/NNNNN.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -142,23 +144,24 @@ fn one(
     stop: &AtomicBool,
 ) -> Result<FlightResult, BlindError> {
     let truth = draw.truth()?;
-    let work = place.flying(index);
-    create_folder(&work.0)?;
-    let hash = seal::seal(&work.0, &truth)?;
-    let flight = work.0.join("flight");
+    let own = place.flying(index)?;
+    let work = own.path();
+    let hash = seal::seal(work, &truth)?;
+    let flight = work.join("flight");
     fly(&truth, &flight, Some(stop))?;
     let verdict = match explain.explain(&flight) {
         Ok(verdict) => verdict,
         Err(source) => {
             // For whoever looks into it.
             let kept = place.work(index);
-            let flight = if work.keep(&kept).is_ok() { kept.join("flight") } else { flight };
+            let flight =
+                if own.keep(&kept, VERDICT).is_ok() { kept.join("flight") } else { flight };
             return Err(BlindError::Explain { flight, source });
         }
     };
-    let verdict_path = work.0.join("verdict.json");
+    let verdict_path = work.join(VERDICT);
     write_whole(&verdict_path, &json(&verdict)?)?;
-    let opened = seal::open(&work.0, &verdict_path, Some(&hash))?;
+    let opened = seal::open(work, &verdict_path, Some(&hash))?;
     let fisher_z = explain.fisher_z(&flight, &opened.truth);
     let result = FlightResult {
         schema: RESULT_SCHEMA.to_owned(),
@@ -170,7 +173,7 @@ fn one(
         outcome: score(&opened.truth, &verdict, &fisher_z),
     };
     if place.keep {
-        work.keep(&place.work(index))?;
+        own.keep(&place.work(index), VERDICT)?;
     }
     // The result last: where it is, all is.
     write_whole(&place.result(index), &json(&result)?)?;

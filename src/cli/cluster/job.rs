@@ -149,8 +149,10 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
     let named = |files: Vec<PathBuf>| Results::Named {
         files: files.iter().map(|file| cwd.join(file)).collect(),
     };
+    let mut scratch = false;
     let (folder, results) = match &args.work {
         Work::Blind(of) => {
+            scratch = !of.command.has_scratch();
             let (folder, count) = of.command.results()?;
             let flights = cwd.join(&folder).join("flights");
             let suffix = ".json".to_owned();
@@ -160,8 +162,9 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
             )
         }
         Work::Sweep(of) => {
-            let (folder, files) = of.command.results()?;
-            (folder, named(files))
+            let (folder, results, has_scratch) = of.command.results(&cwd)?;
+            scratch = has_scratch;
+            (folder, results)
         }
         Work::Simulate(of) => {
             let (folder, files) = of.command.results()?;
@@ -174,7 +177,6 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
             (PathBuf::new(), named(of.command.results()?))
         }
     };
-    let has_scratch = matches!(&args.work, Work::Blind(of) if !of.command.has_scratch());
     let default = || cluster_folder(&folder);
     let job_folder = cwd.join(cluster.job_folder.clone().unwrap_or_else(default));
     let mut args = vec![command.to_owned()];
@@ -187,7 +189,7 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
         cwd,
         folder: job_folder,
         results,
-        has_scratch,
+        has_scratch: scratch,
         resources: Resources {
             cpus: cluster.cpus,
             time: cluster.time.clone(),

@@ -12,5 +12,6 @@ pub(super) mod levelled;
 pub(super) mod map;
 mod plan_view;
 pub(super) mod posterior;
+pub(super) mod sensitivity;
 pub(super) mod study;
 pub(super) mod track;

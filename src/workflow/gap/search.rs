@@ -10,7 +10,8 @@ use crate::blind::scenario::Scenario;
 use crate::blind::vehicles::true_vehicle;
 use crate::campaign::FlightFolder;
 use crate::gap::{Explained, Input, Options, Verdict, fisher_z};
-use crate::vehicle::library;
+use crate::vehicle::{Vehicle, library};
+use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work};
 use crate::workflow::host::Host;
 use crate::workflow::provenance::provenance;
@@ -40,6 +41,13 @@ fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
     let both = Both { measured: &found, simulated: None, hover: None };
     let explained = compare(&both, &vehicle, &Options::default())?;
     Ok((explained, found))
+}
+
+/// `updraft gap` on a campaign folder with this model: verdict on its calibration.
+pub(crate) fn searched(campaign: &Path, model: &Vehicle) -> Result<Verdict, WorkflowError> {
+    let (found, _) = one_flight(campaign, None)?;
+    let both = Both { measured: &found, simulated: None, hover: None };
+    Ok(compare(&both, model, &Options::default())?.verdict)
 }
 
 /// `updraft gap` on a flight folder.

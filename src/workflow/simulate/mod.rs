@@ -98,6 +98,9 @@ pub struct Flown {
     pub saturated: Vec<u16>,
     /// Slots whose battery ran flat in flight.
     pub flat: Vec<u16>,
+    /// Whether a log could not be written, which says nothing of the flight.
+    #[serde(skip)]
+    pub unwritten: bool,
 }
 
 /// The vehicle of a flight (another, if given), with the effects that were chosen.
@@ -245,6 +248,7 @@ pub fn simulate(
     let mut failed = Vec::new();
     let mut stopped = false;
     let mut flat = Vec::new();
+    let mut unwritten = false;
     for (slot, result) in ready.open.iter().zip(results) {
         if matches!(&result, Ok(summary) if summary.flat_s.is_some()) {
             flat.push(slot.slot);
@@ -253,7 +257,10 @@ pub fn simulate(
             Ok(summary) if summary.saturated_share > 0.0 => saturated.push(slot.slot),
             Ok(_) => {}
             Err(WorkflowError::Interrupted) => stopped = true,
-            Err(error) => failed.push(with_reasons(&error)),
+            Err(error) => {
+                unwritten |= is_of_the_disk(&error);
+                failed.push(with_reasons(&error));
+            }
         }
     }
     warn_of_flat_batteries(host, plan, &flat);
@@ -261,7 +268,7 @@ pub fn simulate(
     if stopped {
         return Err(WorkflowError::Interrupted);
     }
-    Ok(Flown { saturated, flat, ..flown })
+    Ok(Flown { saturated, flat, unwritten, ..flown })
 }
 
 /// Flies the drones that have no log yet.
@@ -311,6 +318,17 @@ fn fly_open(
         .collect();
     progress.finish();
     results
+}
+
+/// Whether an error is of a log's file, not of the flight.
+fn is_of_the_disk(error: &WorkflowError) -> bool {
+    match error {
+        WorkflowError::File(_) => true,
+        WorkflowError::Sim(error) => {
+            matches!(**error, SimError::File { .. } | SimError::Log { .. })
+        }
+        _ => false,
+    }
 }
 
 fn warn_of_flat_batteries(host: &dyn Host, plan: &Plan, flat: &[u16]) {
@@ -371,5 +389,6 @@ pub(crate) fn settle(
         failed,
         saturated: Vec::new(),
         flat: Vec::new(),
+        unwritten: false,
     })
 }

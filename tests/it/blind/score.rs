@@ -389,7 +389,9 @@ fn copies_of_a_flight_do_no_harm() {
         })
         .into();
     let all = std::thread::scope(|scope| {
-        let run = |place| scope.spawn(|| run(&settings, place, Share::default(), "updraft", &Slow));
+        let settings = &settings;
+        let run =
+            |place| scope.spawn(move || run(settings, place, Share::default(), "updraft", &Slow));
         let copies: Vec<_> = places.iter().map(run).collect();
         copies.into_iter().map(|copy| copy.join().unwrap().unwrap()).collect::<Vec<_>>()
     });

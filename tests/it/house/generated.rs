@@ -28,6 +28,8 @@ fn json_schemas_are_current() {
         (Format::Analysis, "analysis"),
         (Format::Study, "study"),
         (Format::Cell, "cell"),
+        (Format::Sensitivity, "sensitivity"),
+        (Format::SensitivityItem, "sensitivity-item"),
         (Format::Vehicle, "vehicle"),
         (Format::Logs, "logs"),
         (Format::Start, "start"),

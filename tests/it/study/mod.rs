@@ -2,5 +2,6 @@
 
 mod result;
 mod resume;
+mod sensitivity;
 pub(crate) mod support;
 mod template;

@@ -56,7 +56,10 @@ fn a_template_without_a_ladder_is_refused() {
 #[test]
 fn a_name_that_is_no_study_is_told_what_is_built_in() {
     let error = StudyPlan::load("templates/studies.toml").unwrap_err().to_string();
-    assert_eq!(error, "there is no study templates/studies.toml; built in is study.toml");
+    assert_eq!(
+        error,
+        "there is no study templates/studies.toml; built in are study.toml and sensitivity.toml"
+    );
 }
 
 #[test]
