@@ -5,13 +5,16 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::error::StudyError;
-use super::sensitivity::{self, SENSITIVITY_TEMPLATE_SCHEMA, SensitivityPlan};
+use super::sensitivity::{self, SensitivityPlan};
 use super::template::{MAX_STUDY_BYTES, StudyPlan};
 use crate::base::file::read_whole;
 use crate::base::parse;
 
 /// Name of the built-in sensitivity study.
 const SENSITIVITY: &str = "sensitivity";
+
+/// Beginning of the format's name in its files, of any version.
+const SCHEMA: &str = "updraft.sensitivity/";
 
 /// A study of either kind, read and resolved.
 #[derive(Clone, Debug)]
@@ -38,7 +41,7 @@ impl AnyStudy {
         if path.is_file() {
             let bytes = read_whole(path, MAX_STUDY_BYTES)?;
             let kind: Option<Kind> = parse::toml(&String::from_utf8_lossy(&bytes)).ok();
-            if kind.is_some_and(|kind| kind.schema == SENSITIVITY_TEMPLATE_SCHEMA) {
+            if kind.is_some_and(|kind| kind.schema.starts_with(SCHEMA)) {
                 return Ok(Self::Sensitivity(Box::new(SensitivityPlan::read(path)?)));
             }
         } else {

@@ -105,9 +105,9 @@ fn panel(
     let (least, most) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
     let (low, high) = if is_sobol {
         // An interval far below 0 or above 1 says no more than that nothing is known.
-        (least.max(-0.3).min(0.0), most.clamp(1.0, 1.3))
+        (least.clamp(-0.3, 0.0), most.clamp(1.0, 1.3))
     } else {
-        (least.min(-0.5).max(-1.3), most.clamp(0.5, 1.3))
+        (least.clamp(-1.3, -0.5), most.clamp(0.5, 1.3))
     };
     let (from, to) = (left + NAMES, left + width - 14.0);
     let place = |value: f64| from + (value.clamp(low, high) - low) / (high - low) * (to - from);

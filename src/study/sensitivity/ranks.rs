@@ -39,7 +39,7 @@ pub(super) fn coefficients(
     let columns = ranked.len();
     // Sums: the number, each column, and each product of two.
     let mut blocks = Blocks::new(n, 1 + columns + columns * (columns + 1) / 2);
-    let middle = (n as f64 + 1.0) / 2.0;
+    let middle = f64::midpoint(n as f64, 1.0);
     for campaign in 0..n {
         let values: Vec<f64> = ranked
             .iter()
@@ -119,7 +119,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut ranks = vec![0.0; values.len()];
     let mut before = 0;
     for equal in order.chunk_by(|a, b| value(a) == value(b)) {
-        let rank = before as f64 + (equal.len() as f64 + 1.0) / 2.0;
+        let rank = before as f64 + f64::midpoint(equal.len() as f64, 1.0);
         for index in equal {
             if let Some(place) = ranks.get_mut(*index) {
                 *place = rank;

@@ -175,9 +175,7 @@ impl SensitivityPlan {
         }
         let outcomes = outcomes(&place, &file)?;
         let setup = setup(&place, &file)?;
-        setup.check().map_err(|reason| {
-            place.error(&file.campaign, format!("the campaign cannot be flown: {reason}"))
-        })?;
+        check(&place, &file, &setup)?;
         // Files are named as from the study, and looked for there.
         for factor in &mut factors {
             if let (Target::Campaign | Target::Vehicle, Levels::List(levels)) =
@@ -190,14 +188,9 @@ impl SensitivityPlan {
         }
         for (factor, from) in factors.iter().zip(file.factor.get_ref()) {
             for level in factor.levels.ends() {
-                let mut levels: Vec<Level> =
-                    factors.iter().map(|factor| factor.levels.middle()).collect();
-                for (other, place) in factors.iter().zip(&mut levels) {
-                    if other.name == factor.name {
-                        *place = level.clone();
-                    }
-                }
-                let checked = setup.with(&factors, &levels).and_then(|setup| setup.check());
+                // Alone, so that the factor that cannot be is the one that is told.
+                let (alone, levels) = (std::slice::from_ref(factor), [level.clone()]);
+                let checked = setup.with(alone, &levels).and_then(|setup| setup.check());
                 checked.map_err(|reason| {
                     let message = format!("{} cannot be {level}: {reason}", factor.name);
                     place.error(&from.drives, message)
@@ -222,6 +215,22 @@ impl SensitivityPlan {
     pub fn setup_of(&self, item: &Item) -> Result<Setup, String> {
         self.setup.with(&self.factors, &item.levels)
     }
+}
+
+/// Checks what is fixed, and points at what cannot be: the campaign, the vehicle, or a key that is set.
+fn check(place: &Place<'_>, file: &File, setup: &Setup) -> Result<(), TemplateError> {
+    let fails = |reason: String| format!("the campaigns cannot be flown: {reason}");
+    let mut checked = Setup { vehicle: None, overrides: Vec::new(), ..setup.clone() };
+    checked.check().map_err(|reason| place.error(&file.campaign, fails(reason)))?;
+    if let Some(vehicle) = &file.vehicle {
+        checked.vehicle.clone_from(&setup.vehicle);
+        checked.check().map_err(|reason| place.error(vehicle, fails(reason)))?;
+    }
+    for (key, value) in &file.set {
+        flatten(key, value.get_ref(), &mut checked.overrides);
+        checked.check().map_err(|reason| place.error(value, fails(reason)))?;
+    }
+    Ok(())
 }
 
 fn seeds(place: &Place<'_>, given: Option<&Spanned<String>>) -> Result<Seeds, TemplateError> {
@@ -406,8 +415,10 @@ fn target(place: &Place<'_>, one: &FactorFile) -> Result<Target, TemplateError> 
     let texts = &one.drives.get_ref().0;
     let keys: Option<Vec<String>> =
         texts.iter().map(|text| text.strip_prefix("set.").map(str::to_owned)).collect();
+    let unknowable =
+        || place.error(&one.drives, "only effects and numbers of a vehicle can be known or not");
     if let Some(keys) = keys {
-        return Ok(Target::Keys(keys));
+        return if one.known { Err(unknowable()) } else { Ok(Target::Keys(keys)) };
     }
     let [text] = &texts[..] else {
         return Err(place.error(&one.drives, "only keys of the template can be driven together"));
@@ -442,9 +453,7 @@ fn target(place: &Place<'_>, one: &FactorFile) -> Result<Target, TemplateError> 
         _ => return Err(unknown(text)),
     };
     if one.known && !matches!(found, Target::Effect { .. } | Target::Parameter { .. }) {
-        return Err(
-            place.error(&one.drives, "only effects and numbers of a vehicle can be known or not")
-        );
+        return Err(unknowable());
     }
     Ok(found)
 }

@@ -115,13 +115,12 @@ impl<'a> Campaigns<'a> {
         let work = simulated(root)?;
         let analysed = Analysing::begin(host, &work, &Settings::default(), None)?.run(false)?;
         let flights = &analysed.analysis.flights;
-        let maps = flights
+        let mut maps = flights
             .iter()
             .filter(|flight| flight.purpose == Purpose::Measurement)
             .filter_map(|flight| flight.map.as_ref());
         let outcome = maps
-            .filter_map(Outcome::of_map)
-            .next()
+            .find_map(Outcome::of_map)
             .ok_or_else(|| WorkflowError::Nothing("the analysis gave no map".to_owned()))?;
         let naming = match (&self.study.naming, mission.flights.first()) {
             (Some(effect), Some(flight)) => {
