@@ -105,7 +105,7 @@ mod tests {
         put(&root.join("2026/.hidden/plan.json"));
         put(&root.join("2026/old/archive.json"));
         put(&root.join("2026/old/x/analysis.json"));
-        put(&root.join("1/2/3/4/5/6/7/analysis.json"));
+        put(&root.join("1/2/3/4/5/6/7/8/analysis.json"));
         put(&root.join("elsewhere/analysis.json"));
         #[cfg(unix)]
         std::os::unix::fs::symlink(root.join("elsewhere"), root.join("2026/link")).unwrap();

@@ -66,7 +66,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Values<T> {
 /// One drone of a map with its series, or a place of the plan without a log.
 #[derive(Debug, Deserialize)]
 pub struct Series {
-    /// Slot number.
+    /// Number of the drone's slot.
     #[serde(default)]
     pub slot: Option<u16>,
     /// Label; absent: a place without a log.

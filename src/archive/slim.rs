@@ -26,10 +26,10 @@ pub struct Analysis {
     pub flights: Vec<Flight>,
 }
 
-/// One flight.
+/// One flight of an analysis.
 #[derive(Debug, Deserialize)]
 pub struct Flight {
-    /// Short name.
+    /// Short name of the flight.
     pub name: String,
     /// Purpose of the flight.
     pub purpose: Purpose,
@@ -39,7 +39,7 @@ pub struct Flight {
     /// True vertical air speed of a simulated flight in uniform air, m/s.
     #[serde(default)]
     pub true_updraft_mps: Option<f64>,
-    /// Analysed drones.
+    /// Drones with an analysed log.
     pub drones: Vec<Drone>,
     /// Number of logs given.
     #[serde(default)]
@@ -68,7 +68,7 @@ pub struct Headline {
 /// A value with its standard error, both if known.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 pub struct Known {
-    /// The value.
+    /// Value of the estimate.
     pub value: Option<f64>,
     /// Standard error; 0 for what was held.
     #[serde(default)]
@@ -85,15 +85,15 @@ impl Known {
 /// One drone of a flight.
 #[derive(Debug, Deserialize)]
 pub struct Drone {
-    /// Slot number.
+    /// Number of the drone's slot.
     pub slot: Option<u16>,
-    /// Label.
+    /// Label of the drone.
     pub name: String,
-    /// Log file.
+    /// Path of the drone's log.
     pub source: String,
     /// Alignment of its clock.
     pub clock: Clock,
-    /// Windows.
+    /// Windows of the flight.
     pub windows: Vec<Window>,
     /// Laws fitted to them.
     pub laws: Option<Laws>,
@@ -103,7 +103,7 @@ pub struct Drone {
     /// Set if the laws rest on a part of the ladder.
     #[serde(default)]
     pub partial_ladder: Option<IgnoredAny>,
-    /// Doubts.
+    /// Doubts about the drone.
     #[serde(default)]
     pub warnings: Vec<IgnoredAny>,
 }
@@ -119,7 +119,7 @@ pub struct Clock {
     pub start: Option<GpsTime>,
 }
 
-/// One window.
+/// One window of a drone.
 #[derive(Debug, Deserialize)]
 pub struct Window {
     /// Kind of the segment.
@@ -128,7 +128,7 @@ pub struct Window {
     pub pulse_phi_us: Sample,
     /// Tilt, degrees.
     pub tilt_deg: Sample,
-    /// Battery.
+    /// Battery in the window.
     #[serde(default)]
     pub supply: Option<Supply>,
     /// Reasons why it is not used.
@@ -138,7 +138,7 @@ pub struct Window {
 /// Statistics of samples.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct Sample {
-    /// Median.
+    /// Median of the samples.
     pub median: Option<f64>,
     /// Standard error of the mean.
     #[serde(default)]
@@ -159,18 +159,18 @@ pub struct Supply {
 pub struct Laws {
     /// Signed quadratic, W free.
     pub signed_quadratic: Option<Fit>,
-    /// Straight line.
+    /// Fit of a straight line.
     pub linear: Option<Fit>,
 }
 
 /// A fitted law.
 #[derive(Debug, Deserialize)]
 pub struct Fit {
-    /// Parameters.
+    /// Parameters of the law.
     pub parameters: Vec<Parameter>,
-    /// Points fitted.
+    /// Number of points fitted.
     pub points: usize,
-    /// Reduced chi².
+    /// Reduced chi² of the fit.
     pub chi2_reduced: Option<f64>,
     /// Probability of that chi².
     #[serde(default)]
@@ -185,7 +185,7 @@ pub struct Fit {
 /// A parameter of a law.
 #[derive(Debug, Deserialize)]
 pub struct Parameter {
-    /// Symbol.
+    /// Symbol of the parameter.
     pub name: String,
     /// Value and standard error.
     pub estimate: Known,
@@ -231,10 +231,10 @@ pub struct Map {
     /// Comparison with the truth.
     #[serde(default)]
     pub truth: Option<Truth>,
-    /// Posterior.
+    /// Posterior of the map.
     #[serde(default)]
     pub posterior: Option<Posterior>,
-    /// Thermals.
+    /// Thermals of the map.
     #[serde(default)]
     pub thermals: Vec<Thermal>,
 }
@@ -343,9 +343,9 @@ pub struct Scales {
 /// One drone of a map without its series.
 #[derive(Debug, Deserialize)]
 pub struct MapDrone {
-    /// Slot number.
+    /// Number of the drone's slot.
     pub slot: Option<u16>,
-    /// Label.
+    /// Label of the drone.
     pub name: String,
     /// Position in the show frame, m.
     #[serde(default)]
@@ -378,11 +378,11 @@ pub struct Errors {
     pub window_mps: Option<f64>,
     /// Law apart from the zero.
     pub law_mps: Option<f64>,
-    /// Zero.
+    /// Part of the zero.
     pub zero_mps: Option<f64>,
-    /// Battery.
+    /// Part of the battery.
     pub battery_mps: Option<f64>,
-    /// Wind.
+    /// Part of the wind.
     pub wind_mps: Option<f64>,
 }
 
@@ -411,7 +411,7 @@ pub fn flags(quality: &[Flag], at_s: Option<f64>) -> String {
     names.join(";")
 }
 
-/// A thermal.
+/// A thermal of a map.
 #[derive(Debug, Deserialize)]
 pub struct Thermal {
     /// Show time of its place, s.

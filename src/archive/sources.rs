@@ -57,7 +57,7 @@ pub struct Sources {
 /// Plan and records of a flight.
 #[derive(Debug)]
 pub struct FlightSources {
-    /// Plan.
+    /// Plan of the flight.
     pub plan: Plan,
     /// SHA-256 of the plan.
     pub plan_sha256: String,

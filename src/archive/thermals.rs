@@ -5,7 +5,7 @@ use super::slim::Thermal;
 use super::table::{Column, real, text, time, truth, whole};
 use crate::base::frame::Geodetic;
 
-/// One thermal.
+/// One thermal of one flight.
 #[derive(Debug)]
 pub struct ThermalRow<'a> {
     flown: &'a Flown<'a>,

@@ -43,8 +43,9 @@ fn a_campaign_is_gathered_with_all_its_rows() {
     for (name, value) in
         [("w_mps", first.w_mps), ("low_mps", first.low_mps), ("truth_mps", first.truth_mps)]
     {
-        let wanted = format!("{name}: {:?}", value.unwrap());
-        assert!(seconds[0].contains(&wanted), "{wanted}: {}", seconds[0]);
+        let read = seconds[0].split(&format!(" {name}: ")).nth(1).unwrap();
+        let read = read.split([',', '}']).next().unwrap();
+        assert_eq!(read.parse().ok(), value, "{name}: {}", seconds[0]);
     }
     let filled = seconds.last().unwrap();
     assert!(filled.contains("drone: \"slot 48\", airframe: \"58\""), "{filled}");
@@ -145,7 +146,6 @@ fn a_simulated_campaign_is_gathered_and_flown_again_replaces_itself() {
     let fit = &analysis["flights"][0]["drones"][0]["laws"]["signed_quadratic"];
     let wanted = &fit["parameters"][0]["estimate"]["value"];
     assert_eq!(law.parse().ok(), wanted.as_f64());
-    assert!(!drones[0].contains("hover_pulse_us: null"), "{}", drones[0]);
     let (_, flights) = table(&place, "flights");
     assert!(flights[0].contains("simulated: true"), "{}", flights[0]);
     let id = &said["campaigns"][0]["campaign"];
