@@ -67,8 +67,12 @@ fn given(
 fn raw(matches: &ArgMatches, id: &str) -> Result<Vec<String>, CommandError> {
     let values = matches.get_raw(id).into_iter().flatten();
     let text = |value: &std::ffi::OsStr| {
-        let wrong =
-            || CommandError::Usage(format!("an argument for a cluster must be UTF-8: {value:?}"));
+        let wrong = || {
+            CommandError::Usage(format!(
+                "an argument for a cluster must be UTF-8: {}",
+                value.display()
+            ))
+        };
         value.to_str().map(str::to_owned).ok_or_else(wrong)
     };
     values.map(text).collect()

@@ -35,21 +35,7 @@ fn text(status: &Status) -> String {
         let left = Spent(Duration::from_secs_f64(left_s.min(1e9)));
         lines.push(format!("  left      about {left} at this rate"));
     }
-    lines.push(match &status.queue_unknown {
-        Some(reason) => format!("  tasks     unknown: {reason}"),
-        None => {
-            let merge = if status.merge_waits { ", then the merge" } else { "" };
-            let age = if status.queue_age_s > 0 {
-                format!(" ({} s ago)", status.queue_age_s)
-            } else {
-                String::new()
-            };
-            format!(
-                "  tasks     {} running, {} waiting{merge}{age}",
-                status.running, status.waiting
-            )
-        }
-    });
+    lines.push(tasks(status));
     shards(&mut lines, "stuck", &status.stuck, |shard| {
         let silent = Spent(Duration::from_secs_f64(shard.silent_s.unwrap_or(0.0)));
         format!("no result for {silent} on {}", shard.place.as_deref().unwrap_or("?"))
@@ -63,6 +49,18 @@ fn text(status: &Status) -> String {
     }
     lines.push(format!("  output    {}", status.folder.shown()));
     lines.join("\n") + "\n"
+}
+
+fn tasks(status: &Status) -> String {
+    if let Some(reason) = &status.queue_unknown {
+        return format!("  tasks     unknown: {reason}");
+    }
+    let merge = if status.merge_waits { ", then the merge" } else { "" };
+    let age = match status.queue_age_s {
+        0 => String::new(),
+        age_s => format!(" ({age_s} s ago)"),
+    };
+    format!("  tasks     {} running, {} waiting{merge}{age}", status.running, status.waiting)
 }
 
 fn shards(

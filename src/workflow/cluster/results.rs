@@ -1,6 +1,6 @@
 //! Files in which the items of some work appear, each whole or not at all.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -63,7 +63,7 @@ impl Results {
     /// When each result was finished, Unix time in ms; `None` for one that is missing. Each folder is listed
     /// once, which on the file systems of clusters is much faster than to ask for each file.
     pub fn finished(&self) -> Vec<Option<u64>> {
-        let mut items: BTreeMap<PathBuf, HashMap<OsString, usize>> = BTreeMap::new();
+        let mut items: BTreeMap<PathBuf, BTreeMap<OsString, usize>> = BTreeMap::new();
         for (item, path) in (0..self.count()).filter_map(|item| Some((item, self.path(item)?))) {
             let folder = path.parent().unwrap_or(Path::new("")).to_owned();
             if let Some(name) = path.file_name() {

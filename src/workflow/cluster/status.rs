@@ -112,7 +112,7 @@ pub fn status(host: &dyn Host, folder: &std::path::Path) -> Result<Status, Workf
         let bound_s = usual_s.map(|usual_s| (STUCK_TIMES * usual_s).max(STUCK_LEAST_S));
         match silent_s {
             Some(silent_s) if bound_s.is_some_and(|bound_s| silent_s > bound_s) => {
-                stuck.push(state)
+                stuck.push(state);
             }
             None if task.is_none() && queue_unknown.is_none() => ended.push(state),
             _ => {}

@@ -1,11 +1,12 @@
 //! A blind table on a real scheduler whose node dies in the middle: the bytes of one process.
 
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::shards::{BLIND, assert_same, files};
-use super::slurm_daemons::Slurm;
+use super::slurm_daemons::{Slurm, elapsed};
 use crate::cli::support::{Bench, Ended};
+use updraft::workflow::clock::SystemClock;
 
 /// Flights of the table.
 const FLIGHTS: &str = "3";
@@ -33,10 +34,10 @@ fn a_node_that_dies_costs_nothing_but_time() {
         [&["cluster", "submit"], &blind("many")[..], &["--shards", "3", "--time", "5"]].concat();
     let submitted = expect(0, &submit);
     assert!(submitted.err.contains("Submitted array"), "{submitted}");
-    let begun = Instant::now();
+    let begun = SystemClock::start();
     let results = || fs::read_dir(bench.path("many/flights")).map_or(0, Iterator::count);
     while results() < 1 {
-        assert!(begun.elapsed() < LONGEST, "{}", slurm.run("squeue", &[]));
+        assert!(elapsed(&begun) < LONGEST, "{}", slurm.run("squeue", &[]));
         std::thread::sleep(Duration::from_millis(50));
     }
     slurm.kill_node(1);
@@ -50,7 +51,7 @@ fn a_node_that_dies_costs_nothing_but_time() {
                 outputs.map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap_or_default());
             texts.collect::<Vec<_>>().join("\n--\n")
         };
-        assert!(begun.elapsed() < LONGEST, "{}\n{}", slurm.run("squeue", &[]), said());
+        assert!(elapsed(&begun) < LONGEST, "{}\n{}", slurm.run("squeue", &[]), said());
         slurm.hurry();
         std::thread::sleep(Duration::from_millis(200));
     }

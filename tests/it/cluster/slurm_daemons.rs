@@ -4,19 +4,26 @@
 use std::fs;
 use std::io::Read as _;
 use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tempfile::TempDir;
+use updraft::workflow::clock::{Clock as _, SystemClock};
 
 /// So long a daemon may take to come up.
-const UP: Duration = Duration::from_secs(60);
+const UP: Duration = Duration::from_mins(1);
 
 pub(super) struct Slurm {
     folder: TempDir,
     daemons: Vec<Child>,
     nodes: Vec<Child>,
+}
+
+/// Time on the wall since a clock was started.
+pub(super) fn elapsed(begun: &SystemClock) -> Duration {
+    Duration::from_micros(begun.now())
 }
 
 /// Programs that it takes, from Debian's packages `slurm-wlm` and `munge`.
@@ -57,9 +64,8 @@ impl Slurm {
         for below in ["munge", "state", "spool", "run", "log"] {
             fs::create_dir(root.join(below)).unwrap();
         }
-        use std::os::unix::fs::PermissionsExt as _;
         let mode = |path: &Path, mode| {
-            fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap()
+            fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
         };
         mode(root, 0o755);
         mode(&root.join("munge"), 0o755);
@@ -145,14 +151,14 @@ impl Slurm {
 
     /// Waits, and notices when a daemon has died.
     fn wait(&mut self, what: &str, is_up: impl Fn(&Self) -> bool) -> Result<(), String> {
-        let begun = Instant::now();
+        let begun = SystemClock::start();
         while !is_up(self) {
             for daemon in self.daemons.iter_mut().chain(&mut self.nodes) {
                 if let Some(status) = daemon.try_wait().unwrap() {
                     return Err(format!("a daemon ended while waiting for {what}: {status}"));
                 }
             }
-            if begun.elapsed() > UP {
+            if elapsed(&begun) > UP {
                 let log = fs::read_to_string(self.path("log/slurmctld.log")).unwrap_or_default();
                 return Err(format!("{what} did not come up: {log}"));
             }
@@ -169,9 +175,9 @@ impl Drop for Slurm {
         for daemon in self.nodes.iter_mut().rev().chain(self.daemons.iter_mut().rev()) {
             if daemon.try_wait().ok().flatten().is_none() {
                 let _ = Command::new("kill").arg(daemon.id().to_string()).status();
-                let begun = Instant::now();
+                let begun = SystemClock::start();
                 while daemon.try_wait().ok().flatten().is_none()
-                    && begun.elapsed() < Duration::from_secs(10)
+                    && elapsed(&begun) < Duration::from_secs(10)
                 {
                     std::thread::sleep(Duration::from_millis(20));
                 }
