@@ -7,7 +7,7 @@ use crate::base::shard::Shard;
 /// Outcome of a shard's work.
 #[derive(Clone, Debug)]
 pub struct ShardDone {
-    /// The shard.
+    /// Shard whose items were worked on.
     pub shard: Shard,
     /// Number of its items.
     pub items: usize,

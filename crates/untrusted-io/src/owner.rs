@@ -1,10 +1,15 @@
 //! Marks that say which process a temporary file or folder belongs to, for folders that several machines
 //! write into and whose file system may know no locks.
 
+use std::path::Path;
 use std::sync::OnceLock;
+
+use crate::file::read_whole;
 
 /// Longest host name in a mark, characters.
 const MOST_HOST: usize = 40;
+/// Longest identity of a boot, bytes.
+const MOST_BYTES: u64 = 1000;
 /// Sign between the parts of a mark; no part contains it.
 const BETWEEN: char = '-';
 
@@ -55,7 +60,8 @@ fn owner_of(text: &str) -> Option<Owner> {
 fn place() -> &'static str {
     static PLACE: OnceLock<String> = OnceLock::new();
     PLACE.get_or_init(|| {
-        let boot = std::fs::read("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+        let boot = read_whole(Path::new("/proc/sys/kernel/random/boot_id"), MOST_BYTES);
+        let boot = boot.unwrap_or_default();
         let numbers = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(&boot);

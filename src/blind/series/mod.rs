@@ -195,9 +195,9 @@ impl Settings {
 /// A flight of a table whose truth can be drawn at any time.
 #[derive(Clone, Debug)]
 pub struct Draw {
-    /// Its seed.
+    /// Seed of the flight.
     pub seed: u64,
-    /// What kind of flight it is.
+    /// Kind of the flight.
     pub cell: Arc<Cell>,
 }
 

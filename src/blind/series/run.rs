@@ -89,12 +89,12 @@ pub fn run(
     Ok(taken)
 }
 
-/// What became of a flight.
+/// A flight of a table after a run, with its result or without.
 #[derive(Debug)]
 pub struct Taken {
     /// Place in the table.
     pub index: usize,
-    /// Its result, or why there is none.
+    /// Result of the flight, or why there is none.
     pub result: Result<FlightResult, BlindError>,
     /// Whether it was finished before.
     pub was_there: bool,

@@ -70,7 +70,7 @@ fn raw(matches: &ArgMatches, id: &str) -> Result<Vec<String>, CommandError> {
         let wrong = || {
             CommandError::Usage(format!(
                 "an argument for a cluster must be UTF-8: {}",
-                value.display()
+                value.to_string_lossy()
             ))
         };
         value.to_str().map(str::to_owned).ok_or_else(wrong)

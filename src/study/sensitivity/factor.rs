@@ -15,13 +15,13 @@ pub struct Factor {
     pub name: String,
     /// Unit of the levels, for axes; empty: none.
     pub unit: String,
-    /// What the factor drives.
+    /// Quantity that the factor drives.
     pub target: Target,
     /// Levels that it takes.
     pub levels: Levels,
 }
 
-/// What a factor drives.
+/// Quantity that a factor drives.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// Template of the campaign.
@@ -86,9 +86,9 @@ pub enum Levels {
 /// Numbers between two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Lowest level.
+    /// Lowest level of the factor, in its unit.
     pub from: f64,
-    /// Highest level.
+    /// Highest level of the factor, in its unit.
     pub to: f64,
     /// Whether the logarithm is uniform, instead of the number.
     pub log: bool,
@@ -173,7 +173,7 @@ impl Levels {
         }
     }
 
-    /// What a level counts as in statistics: its number, or the place of a word in its list.
+    /// Number that a level counts as in statistics: its own, or the place of a word in its list.
     pub fn score(&self, level: &Level) -> f64 {
         match self {
             Self::List(levels) if !self.are_numbers() => {

@@ -41,10 +41,10 @@ pub struct ItemRecord {
     pub warnings: Vec<String>,
 }
 
-/// What is kept of a finished campaign while all are gathered.
+/// Part of a finished campaign's record that is held while all are gathered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What it came to, or why it was lost.
+    /// Outcome of the campaign, or why it was lost.
     pub result: Result<Outcome, Box<str>>,
     /// Number of warnings.
     pub warnings: u32,
@@ -109,7 +109,7 @@ impl ItemRecord {
         write_whole(&path, &json)
     }
 
-    /// What is kept of it while all are gathered.
+    /// Part of the record that is held while all are gathered.
     pub fn row(&self) -> Row {
         let result = match (&self.outcome, &self.lost) {
             (Some(outcome), _) => Ok(outcome.clone()),

@@ -1,4 +1,4 @@
-//! What one campaign came to: the map's error, its coverage, and what the search named.
+//! Outcome of one campaign: the map's error, its coverage, and what the search named.
 
 use std::fmt;
 

@@ -11,7 +11,7 @@ use super::template::SensitivityPlan;
 /// A column of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Name.
+    /// Name of the column, as in the head of the table.
     pub name: String,
     /// Type of its values.
     pub kind: Kind,
@@ -20,11 +20,11 @@ pub struct Column {
 /// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Whole numbers.
+    /// Whole numbers of 64 bits.
     Integer,
-    /// Numbers.
+    /// Numbers with fractions.
     Number,
-    /// Texts.
+    /// Texts of any length.
     Text,
 }
 
@@ -35,9 +35,9 @@ pub enum Value {
     Empty,
     /// A whole number.
     Integer(i64),
-    /// A number.
+    /// A number with a fraction.
     Number(f64),
-    /// A text.
+    /// A text of any length.
     Text(String),
 }
 

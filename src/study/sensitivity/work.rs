@@ -17,13 +17,13 @@ use crate::study::StudyError;
 /// A campaign that was flown, before it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Done {
-    /// What it came to, or why it was lost: one sentence.
+    /// Outcome of the campaign, or why it was lost: one sentence.
     pub result: Result<Outcome, String>,
-    /// What is doubtful about it.
+    /// Doubts about the campaign, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Why a campaign was not brought to an end, and is tried again by the next run.
+/// Reason why a campaign was not brought to an end; the next run tries it again.
 #[derive(Debug)]
 pub enum NotDone {
     /// The user asked to stop.

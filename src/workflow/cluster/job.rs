@@ -16,7 +16,7 @@ pub struct Resources {
     pub time: Option<String>,
     /// Memory of a task, as Slurm reads it.
     pub mem: Option<String>,
-    /// Partition.
+    /// Partition of the cluster; `None`: its default.
     pub partition: Option<String>,
     /// Account that is charged.
     pub account: Option<String>,

@@ -1,6 +1,6 @@
 //! How long one item takes, and how many tasks follow from it.
 
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use super::job::Job;
 use crate::workflow::clock::Stopwatch;
@@ -41,8 +41,6 @@ pub fn measure(host: &dyn Host, job: &Job) -> Result<Option<Measured>, WorkflowE
         .args(["--shard", &shard, "--quiet", "--no-progress"])
         .current_dir(&job.cwd)
         .env("RAYON_NUM_THREADS", "1")
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
         .output();
     let output = output
         .map_err(|error| WorkflowError::Failed(format!("failed to measure an item: {error}")))?;

@@ -1,7 +1,7 @@
 //! Questions to the scheduler: how large an array may be, and which tasks are in its queue.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Output};
 
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +112,7 @@ fn duration_s(text: &str) -> Option<u64> {
 
 /// Runs a program of the scheduler.
 pub(super) fn run(program: &str, args: &[&str]) -> std::io::Result<Output> {
-    Command::new(program).args(args).stdin(Stdio::null()).output()
+    Command::new(program).args(args).output()
 }
 
 /// Runs a program of the scheduler, which must succeed.

@@ -1,7 +1,7 @@
 //! Submission and cancellation of a job.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use super::job::Job;
 use super::measure::Measured;
@@ -47,7 +47,7 @@ pub fn submit(
     }
     let script = job.folder.join("submit.sh");
     write_whole(&script, text.as_bytes())?;
-    let output = Command::new("bash").arg(&script).stdin(Stdio::null()).output();
+    let output = Command::new("bash").arg(&script).output();
     let output =
         output.map_err(|error| WorkflowError::Failed(format!("bash cannot be run: {error}")))?;
     if !output.status.success() {

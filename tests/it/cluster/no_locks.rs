@@ -1,5 +1,7 @@
 //! Processes in one folder of a file system without locks, killed at random: nothing is lost, nothing double.
 
+#![expect(clippy::print_stderr, reason = "says why it is skipped")]
+
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

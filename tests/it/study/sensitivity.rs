@@ -354,8 +354,7 @@ fn sweep_flies_it_and_prints_what_it_wrote() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("tiny.toml");
     // Two campaigns, the smallest.
-    let text =
-        TINY.replace("samples = 4", "samples = 2").replace("values = [1, 2]", "values = [1, 2.0]");
+    let text = TINY.replace("samples = 4", "samples = 2");
     let text = text.replace("from = 40\nto = 60", "from = 40\nto = 41");
     fs::write(&file, text).unwrap();
     let output = folder.path().join("out");
