@@ -1,7 +1,5 @@
 //! A blind table on a real scheduler whose node dies in the middle: the bytes of one process.
 
-#![expect(clippy::print_stderr, reason = "says why it is skipped")]
-
 use std::fs;
 use std::time::Duration;
 

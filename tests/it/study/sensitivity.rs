@@ -364,7 +364,9 @@ fn sweep_flies_it_and_prints_what_it_wrote() {
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).output().unwrap()
     };
     let done = sweep();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    // So short a ladder may give no map in one of them.
+    let code = done.status.code();
+    assert!(matches!(code, Some(0 | 3)), "{}", String::from_utf8_lossy(&done.stderr));
     let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(told["schema"], "updraft.sweep-sensitivity/1");
     assert_eq!((told["flown"].as_u64(), told["kept"].as_u64()), (Some(2), Some(0)));
