@@ -10,7 +10,7 @@
 //!   seconds/...                                               a row for each drone and second
 //! ```
 //!
-//! [`gather::gather`] takes one campaign: its short tables are made from [`slim`], the long one is streamed by [`series`].
+//! `gather` takes one campaign: its short tables are made from `slim`, the long one is streamed by `series`.
 //! Files are made in a hidden folder and renamed into their places, one after the other, when all are whole.
 //! The columns are described in `docs/archive.md`.
 
