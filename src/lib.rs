@@ -30,6 +30,7 @@
 //! * [`blind`]: flights with hidden physics that test it.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`archive`]: many campaigns as one Parquet dataset.
+//! * [`live`]: a flight as it happens, or as it was, in a browser.
 //! * [`campaign`]: names of the files in a campaign folder.
 //! * [`workflow`]: the steps of people with drones, for any program.
 //! * [`cli`]: arguments, terminal and exit codes of the program `updraft`.
@@ -54,6 +55,7 @@ pub use mavlink_station::{link, protocol};
 pub use multirotor_sim::{effects, sim, vehicle};
 pub use skybrush_show as show;
 pub use skybrush_show::check;
+pub mod live;
 pub mod mission;
 pub mod numeric;
 pub mod report;

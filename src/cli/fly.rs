@@ -9,8 +9,10 @@ use super::exit::{CommandError, Exit};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::start::LeadArgs;
 use super::fleet::{dry, refuse_of_upload, server};
+use super::live_args::LiveArgs;
 use super::simulate::{AirArgs, air_help, updraft};
 use crate::campaign;
+use crate::live::tap::Tap;
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::end::order_handler;
 use crate::workflow::fleet::fly::{FlyWish, fly, readable};
@@ -18,6 +20,7 @@ use crate::workflow::fleet::output::{FlightOutput, FlyOutput};
 use crate::workflow::fleet::server::fly as fly_through;
 use crate::workflow::fleet::start::needs_person;
 use crate::workflow::fleet::{lock, one_flight, rehearse};
+use crate::workflow::live::LiveHost;
 
 /// Arguments of `updraft fly`.
 #[derive(Debug, Args)]
@@ -27,6 +30,7 @@ use crate::workflow::fleet::{lock, one_flight, rehearse};
   updraft fly my-campaign --flight hover --connect tcp:10.0.0.7:5760 --key swarm.key --lead 60
   updraft fly my-campaign --flight hover --connect skybrush://localhost:5001
   updraft fly my-campaign --flight calibration --guided   # stock firmware
+  updraft fly my-campaign --flight hover --live --live-orders   # seen, and flown, in a browser
   updraft fly my-campaign --connect sim                   # every flight, with virtual drones
 
 The steps of a flight: assign drones to slots by where they stand, check parameters, upload show,
@@ -67,6 +71,8 @@ pub(super) struct FlyArgs {
     /// Replace logs of virtual drones that were flown with other settings
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    live: LiveArgs,
     #[command(flatten)]
     air: AirArgs,
 }
@@ -136,15 +142,21 @@ fn fly_target(
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             readable(&folder)?;
             let mut station = args.connect.open(context, links)?;
-            let mut handler = order_handler(context, &mut station, &folder);
-            let mut crew = Crew::new(context, &mut handler, &folder, &plan);
+            let live = args.live.open(context, &folder, &plan)?;
+            let host = LiveHost::new(context, live.station.clone(), live.orders);
+            let mut tap = Tap::new(&mut station, live.station.clone());
+            let mut handler = order_handler(&host, &mut tap, &folder);
+            let mut crew = Crew::new(&host, &mut handler, &folder, &plan);
             crew.is_guided = args.guided;
-            let flown =
-                crew.listen(args.connect.wait).and_then(|()| fly(context, &mut crew, &wish));
+            let flown = crew.listen(args.connect.wait).and_then(|()| fly(&host, &mut crew, &wish));
             let (flight, ending) = crew.ending(flown)?;
             Ok((vec![flight], ending.into()))
         }
         Target::Sim => {
+            args.live.refuse(
+                "these drones live in a time of their own; fly drones of `updraft fleet virtual` over \
+                 --connect udpin:..., or look at the flight afterwards with `updraft live`",
+            )?;
             needs_person(context, &lead)?;
             let simulation = args.air.simulation(args.updraft, args.force);
             let mut lost = false;
@@ -164,6 +176,10 @@ fn fly_target(
             Ok((flights, if lost { Exit::Losses } else { Exit::Done }))
         }
         Target::Server(address) => {
+            args.live.refuse(
+                "a flight through Skybrush Server is seen in Skybrush Live; afterwards `updraft live` \
+                 shows it from its logs",
+            )?;
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let (with_logs, wait_s) = (!args.no_logs, args.connect.wait);
             readable(&folder)?;

@@ -15,6 +15,8 @@ mod fly;
 mod gap;
 mod hidden;
 mod inspect;
+mod live;
+mod live_args;
 mod logs;
 mod mission_args;
 mod origin;
@@ -139,6 +141,8 @@ enum Command {
     Fly(fly::FlyArgs),
     /// Run the steps of a flight one by one
     Fleet(fleet::FleetArgs),
+    /// Show a flown or simulated flight in a browser, from its logs
+    Live(live::LiveCommandArgs),
     /// List, download, verify and import logs
     Logs(logs::LogsArgs),
     /// Provide the physics and the air for the real firmware's simulator
@@ -235,6 +239,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Simulate(args) => simulate::run(context, &args),
         Command::Fly(args) => fly::run(context, &args),
         Command::Fleet(args) => fleet::run(context, &args),
+        Command::Live(args) => live::run(context, &args),
         Command::Logs(args) => logs::run(context, &args),
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),

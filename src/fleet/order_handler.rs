@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::abort::{Abort, Aborted, Action};
-use super::orders::{ANSWER_SCHEMA, Answer, Inbox, Taken};
+use super::orders::{ANSWER_SCHEMA, Answer, From, Inbox, Taken};
 use super::telemetry::Telemetry;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::conversation::{Conversation as _, Observer as _, Step};
@@ -27,6 +27,8 @@ pub enum Notice {
         action: Action,
         /// Drones that are to carry it out.
         drones: Vec<DroneId>,
+        /// Where it was given.
+        from: From,
     },
     /// The order has ended for a drone.
     Done {
@@ -97,13 +99,13 @@ impl<'a> OrderHandler<'a> {
         self.next_look = now + LOOK;
         let orders = self.inbox.as_mut().map(Inbox::take).unwrap_or_default();
         for taken in orders {
-            let action = taken.order.action;
+            let (action, from) = (taken.order.action, taken.order.from);
             let drones: BTreeSet<DroneId> = match &taken.order.drones {
                 Some(drones) => drones.iter().copied().collect(),
                 None => self.net.heard().into_iter().chain((self.fleet)()).collect(),
             };
             let drones: Vec<DroneId> = drones.into_iter().collect();
-            (self.tell)(&Notice::Ordered { action, drones: drones.clone() });
+            (self.tell)(&Notice::Ordered { action, drones: drones.clone(), from });
             for drone in &drones {
                 let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
                 self.running.insert(*drone, (abort.heard_within(HEARD_WITHIN), action, 0));

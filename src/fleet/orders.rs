@@ -59,6 +59,29 @@ pub struct Order {
     pub action: Action,
     /// Drones that are meant; absent: all.
     pub drones: Option<Vec<DroneId>>,
+    /// Where it was given.
+    #[serde(default)]
+    pub from: From,
+}
+
+/// Where an order was given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum From {
+    /// In another terminal.
+    #[default]
+    Terminal,
+    /// On the station's page.
+    Page,
+}
+
+impl std::fmt::Display for From {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Terminal => "from another terminal",
+            Self::Page => "on the page",
+        })
+    }
 }
 
 /// Progress of a station with an order.
@@ -205,6 +228,7 @@ pub fn give(
     name: &str,
     action: Action,
     drones: Option<Vec<DroneId>>,
+    from: From,
 ) -> Result<Option<Given>, FileError> {
     let folder = flight.join(ORDERS_FOLDER);
     match is_own_folder(&folder) {
@@ -213,7 +237,7 @@ pub fn give(
         Err(error) => return Err(FileError::new("use the folder", &folder, error)),
     }
     let Some(file) = get::<StationFile>(&folder.join(STATION_FILE)) else { return Ok(None) };
-    let order = Order { schema: ORDER_SCHEMA.to_owned(), station: file.station, action, drones };
+    let order = Order { schema: ORDER_SCHEMA.to_owned(), station: file.station, action, drones, from };
     let given = Given {
         order: folder.join(format!("{name}{ORDER_END}")),
         answer: folder.join(format!("{name}{ANSWER_END}")),
@@ -250,7 +274,7 @@ mod tests {
     fn an_order_is_taken_once_and_answered() {
         let flight = tempfile::tempdir().unwrap();
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
-        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE])).unwrap().unwrap();
+        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE]), From::Terminal).unwrap().unwrap();
         let taken = inbox.take();
         assert_eq!(taken[0].order.drones, Some(vec![DRONE]));
         assert_eq!(taken[0].order.action, Action::Land);
@@ -270,7 +294,7 @@ mod tests {
         let flight = tempfile::tempdir().unwrap();
         // A station that is killed leaves its file.
         std::mem::forget(Inbox::open(flight.path(), "one".to_owned()).unwrap());
-        let given = give(flight.path(), "1", Action::Return, None).unwrap().unwrap();
+        let given = give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().unwrap();
         let order = fs::read(&given.order).unwrap();
         let mut later = Inbox::open(flight.path(), "two".to_owned()).unwrap();
         assert!(later.take().is_empty(), "removed when the station begins");
@@ -288,7 +312,7 @@ mod tests {
         fs::create_dir(&folder).unwrap();
         fs::set_permissions(&folder, fs::Permissions::from_mode(0o777)).unwrap();
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
-        let given = give(flight.path(), "1", Action::Land, None).unwrap().unwrap();
+        let given = give(flight.path(), "1", Action::Land, None, From::Terminal).unwrap().unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
         assert_eq!(mode(&folder), 0o700);
         assert_eq!(mode(&folder.join(STATION_FILE)), 0o600);
@@ -306,7 +330,7 @@ mod tests {
         assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
         let file = StationFile { schema: STATION_SCHEMA.to_owned(), station: "two".to_owned() };
         put(&elsewhere.path().join(STATION_FILE), &file).unwrap();
-        let error = give(flight.path(), "1", Action::Return, None).unwrap_err();
+        let error = give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap_err();
         assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
     }
 
@@ -314,7 +338,7 @@ mod tests {
     fn what_is_no_order_is_not_carried_out() {
         let flight = tempfile::tempdir().unwrap();
         assert!(
-            give(flight.path(), "1", Action::Return, None).unwrap().is_none(),
+            give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().is_none(),
             "nobody is there"
         );
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();

@@ -168,6 +168,7 @@ pub struct Flying {
 
 #[expect(clippy::struct_excessive_bools, reason = "what was told, each on its own")]
 struct Watched {
+    slot: u16,
     course: Course,
     flying: Flying,
     /// How long the station had listened when it was heard last.
@@ -236,6 +237,7 @@ impl Monitor {
             let texts = known.map_or(0, |of| of.texts_said);
             let restarts = known.map_or(0, |of| of.restarts);
             let watched = Watched {
+                slot: line.slot,
                 course: Course::new(trajectory),
                 flying: Flying::default(),
                 heard: 0,
@@ -281,6 +283,11 @@ impl Monitor {
     /// State of each watched drone's flight.
     pub fn flying(&self) -> impl Iterator<Item = (DroneId, Flying)> {
         self.watched.iter().map(|(drone, watched)| (*drone, watched.flying))
+    }
+
+    /// Slot of each watched drone.
+    pub fn slots(&self) -> impl Iterator<Item = (DroneId, u16)> {
+        self.watched.iter().map(|(drone, watched)| (*drone, watched.slot))
     }
 
     /// Whether every drone has flown and is on the ground again, or never will take off. A silent

@@ -12,6 +12,10 @@ use super::error::WorkflowError;
 use crate::base::file::sweep_below;
 use crate::base::plain::Shown as _;
 use crate::campaign::lock::FolderLock;
+use crate::fleet::order_handler::Notice;
+use crate::fleet::preflight::Preflight;
+use crate::fleet::slots::FleetTable;
+use crate::live::view::Step;
 
 /// The program that runs a workflow. All but four methods have a default: no progress is shown, and
 /// nobody can be asked.
@@ -82,6 +86,21 @@ pub trait Host: Send + Sync {
         Err(io::Error::new(io::ErrorKind::Unsupported, format!("nobody to answer: {question}")))
     }
 
+    /// Asks a person who can choose between answers, each a word and what it does; the answer arrives while the
+    /// work goes on.
+    ///
+    /// # Errors
+    /// When nobody can be asked.
+    fn offer(&self, question: &str, answers: &[(&str, &str)]) -> io::Result<Receiver<Answer>> {
+        let _ = answers;
+        self.ask(question)
+    }
+
+    /// Reports where a flight stands, for those who show it.
+    fn news(&self, news: &News<'_>) {
+        let _ = news;
+    }
+
     /// Number of times that the work was told to stop: a person who insists while drones are in the
     /// air is not kept waiting.
     fn interruptions(&self) -> u32 {
@@ -134,6 +153,24 @@ impl dyn Host + '_ {
         }
         Ok(lock)
     }
+}
+
+/// Where a flight stands.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum News<'a> {
+    /// Another step has begun, and what is waited for in it, in a sentence.
+    Step(Step, String),
+    /// Which drone flies which slot is known.
+    Assigned(&'a FleetTable),
+    /// The table before a start, as far as it is filled.
+    Preflight(&'a Preflight),
+    /// Show time 0, ms since the GPS epoch; `None`: there is no start any more.
+    Start(Option<i64>),
+    /// News of an order.
+    Order(&'a Notice),
+    /// The question that was open is answered, or not asked any more.
+    Answered,
 }
 
 /// Progress display of long work, shared between threads.

@@ -46,6 +46,7 @@ pub mod gap;
 pub mod hashes;
 pub mod hidden;
 pub mod host;
+pub(crate) mod live;
 pub mod mission;
 pub mod physics;
 pub mod plan;

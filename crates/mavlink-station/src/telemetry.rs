@@ -120,6 +120,8 @@ pub struct Drone {
     pub gps: Heard<Gps>,
     /// State of the battery and the arming checks.
     pub health: Heard<Health>,
+    /// Strength of the radio's signal, % of the best, where the vehicle passes it on.
+    pub signal: Heard<u8>,
     /// Clock of the vehicle.
     pub clock: VehicleClock,
     /// GPS time when it was switched on, by its own clock.
@@ -165,6 +167,11 @@ impl Drone {
         Some((gaps.len() as f64 / sent).min(1.0))
     }
 
+    /// Strength of the radio's signal, % of the best; `None` if nobody tells it.
+    pub fn signal_percent(&self) -> Option<f64> {
+        self.signal.map(|(_, percent)| f64::from(percent))
+    }
+
     /// Newest text that says why arming is refused, without its prefix.
     pub fn prearm_reason(&self) -> Option<&str> {
         let said = |text: &'_ Text| text.text.starts_with("PreArm: ");
@@ -206,6 +213,12 @@ impl Drone {
                 self.booted = booted.filter(|_| time.time_unix_usec > 0).or(self.booted);
             }
             MavMessage::STATUSTEXT(text) => self.text(now, text),
+            MavMessage::RADIO_STATUS(radio) if radio.rssi != u8::MAX => {
+                self.signal = Some((now, strength(radio.rssi)));
+            }
+            MavMessage::RC_CHANNELS(channels) if channels.rssi != u8::MAX => {
+                self.signal = Some((now, strength(channels.rssi)));
+            }
             MavMessage::AUTOPILOT_VERSION(version) => {
                 let [_, patch, minor, major] = version.flight_sw_version.to_le_bytes();
                 let show = version.capabilities.bits() & CAPABILITY != 0;
@@ -260,6 +273,11 @@ impl Drone {
             self.texts.pop_front();
         }
     }
+}
+
+/// A signal of 0 to 254, in %.
+fn strength(rssi: u8) -> u8 {
+    (f64::from(rssi) / 2.54).round() as u8
 }
 
 fn gap((earlier, later): (&u32, &u32)) -> u32 {

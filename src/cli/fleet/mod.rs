@@ -18,14 +18,18 @@ use self::connect::{ConnectArgs, Target};
 use self::start::LeadArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::live_args::LiveArgs;
 use crate::fleet::abort::Action;
 use crate::link::address::Address;
 use crate::link::id::DroneId;
 use crate::link::station::Station;
+use crate::live::tap::Tap;
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::end::{flying, order_handler};
 use crate::workflow::fleet::steps::{self, Started, StepWish};
 use crate::workflow::fleet::{lock, one_flight};
+use crate::workflow::host::Host;
+use crate::workflow::live::LiveHost;
 
 /// Arguments of `updraft fleet`.
 #[derive(Debug, Args)]
@@ -108,6 +112,8 @@ pub(super) struct StartArgs {
     upload: UploadArgs,
     #[command(flatten)]
     lead: LeadArgs,
+    #[command(flatten)]
+    live: LiveArgs,
 }
 
 /// Arguments of `fleet restore`.
@@ -164,13 +170,17 @@ fn with_crew(
 fn with_orders(
     context: &Context,
     args: &StepArgs,
-    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
+    live: &LiveArgs,
+    body: impl FnOnce(&dyn Host, &mut Crew<'_>) -> Result<Exit, CommandError>,
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let mut station = step_station(context, args)?;
-    let mut handler = order_handler(context, &mut station, &folder);
-    let mut crew = Crew::new(context, &mut handler, &folder, &plan);
-    let ended = body(&mut crew);
+    let live = live.open(context, &folder, &plan)?;
+    let host = LiveHost::new(context, live.station.clone(), live.orders);
+    let mut tap = Tap::new(&mut station, live.station.clone());
+    let mut handler = order_handler(&host, &mut tap, &folder);
+    let mut crew = Crew::new(&host, &mut handler, &folder, &plan);
+    let ended = body(&host, &mut crew);
     crew.ending(ended)
 }
 
@@ -286,8 +296,8 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
     let _lock = lock(context, &args.upload.step.campaign)?;
-    with_orders(context, &args.upload.step, |crew| {
-        match steps::start(context, crew, args.upload.wish(), &args.lead.lead())? {
+    with_orders(context, &args.upload.step, &args.live, |host, crew| {
+        match steps::start(host, crew, args.upload.wish(), &args.lead.lead())? {
             Started::NoGo(table) => tables::preflight(context, &table),
             Started::Flown(ending) => Ok(ending.into()),
         }

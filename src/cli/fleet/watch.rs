@@ -7,6 +7,7 @@ use super::start::InterruptArgs;
 use super::{StepArgs, dry, server, with_orders};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
+use crate::cli::live_args::LiveArgs;
 use crate::workflow::fleet::server::take_over;
 use crate::workflow::fleet::watch::follow;
 use crate::workflow::fleet::{lock, one_flight};
@@ -31,6 +32,8 @@ pub(in crate::cli) struct WatchArgs {
     no_logs: bool,
     #[command(flatten)]
     interrupt: InterruptArgs,
+    #[command(flatten)]
+    live: LiveArgs,
 }
 
 pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandError> {
@@ -40,6 +43,7 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
     let server = match args.step.connect.target()? {
         Target::Server(address) => {
             server::refuse(&args.step.connect, &[])?;
+            args.live.refuse("a flight through Skybrush Server is seen in Skybrush Live")?;
             Some(address)
         }
         _ => None,
@@ -52,9 +56,9 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
         let ending = take_over(context, &address, &folder, &plan, wait_s, on_interrupt, with_logs)?;
         return Ok(ending.into());
     }
-    with_orders(context, &args.step, |crew| {
+    with_orders(context, &args.step, &args.live, |host, crew| {
         let on_interrupt = args.interrupt.on_interrupt.into();
-        let ending = follow(context, crew, args.step.connect.wait, on_interrupt, !args.no_logs)?;
+        let ending = follow(host, crew, args.step.connect.wait, on_interrupt, !args.no_logs)?;
         Ok(ending.into())
     })
 }

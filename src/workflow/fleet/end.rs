@@ -12,7 +12,7 @@ use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::fleet::abort::{Aborted, Action};
 use crate::fleet::order_handler::{Notice, OrderHandler};
-use crate::fleet::orders::{Given, Inbox, give, has_station};
+use crate::fleet::orders::{From, Given, Inbox, give, has_station};
 use crate::fleet::slots::FleetTable;
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -20,7 +20,7 @@ use crate::link::station::Station;
 use crate::mission::Plan;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::host::Host;
+use crate::workflow::host::{Host, News};
 
 /// A station that flies answers within this.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
@@ -79,9 +79,9 @@ fn table_of(folder: &FlightFolder) -> BTreeSet<DroneId> {
 
 fn tell(host: &dyn Host, folder: &FlightFolder, notice: &Notice) {
     let (text, step, outcomes) = match notice {
-        Notice::Ordered { action, drones } => {
-            let text = format!("Ordered from another terminal: {}", word(*action));
-            let said = |drone: &DroneId| (*drone, "ordered from another terminal".to_owned());
+        Notice::Ordered { action, drones, from } => {
+            let text = format!("Ordered {from}: {}", word(*action));
+            let said = |drone: &DroneId| (*drone, format!("ordered {from}"));
             (text, word(*action), drones.iter().map(said).collect())
         }
         Notice::Done { action, drone, done } => {
@@ -93,6 +93,7 @@ fn tell(host: &dyn Host, folder: &FlightFolder, notice: &Notice) {
         }
     };
     host.insist(&text);
+    host.news(&News::Order(notice));
     if !step.is_empty()
         && let Err(error) = super::crew::write_outcomes(host, folder, step, &outcomes)
     {
@@ -161,7 +162,7 @@ fn give_to(
     let drones = order.only.as_ref().map(|only| only.iter().copied().collect::<Vec<_>>());
     let mut given: Vec<(Given, &str)> = Vec::new();
     for (folder, flight) in flights {
-        match give(&folder.0, &name, order.action, drones.clone()) {
+        match give(&folder.0, &name, order.action, drones.clone(), From::Terminal) {
             Ok(taken) => given.extend(taken.map(|taken| (taken, flight.as_str()))),
             Err(error) => host
                 .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),

@@ -10,6 +10,10 @@ use crate::workflow::host::{Answer, Host};
 /// Nobody who answers within this: the choice of `--on-interrupt` is taken.
 const ANSWER_WITHIN: Micros = 15 * S;
 
+/// Answers, and what they do.
+const ANSWERS: [(&str, &str); 3] =
+    [("l", "Land the drones"), ("r", "Drones return"), ("f", "Leave them flying")];
+
 /// What drones in the air do when the program that watches or flies them is to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Choice {
@@ -99,7 +103,7 @@ impl<'a> Interrupt<'a> {
                  15 s, or Ctrl-C again: {words}. "
             );
             let may_ask = self.asks && self.host.sees_questions();
-            let Some(answers) = may_ask.then(|| self.host.ask(&text).ok()).flatten() else {
+            let Some(answers) = may_ask.then(|| self.host.offer(&text, &ANSWERS).ok()).flatten() else {
                 return Some(default);
             };
             let count = self.host.interruptions();

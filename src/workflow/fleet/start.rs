@@ -12,7 +12,7 @@ use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::workflow::ending::Ending;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::host::Host;
+use crate::workflow::host::{Host, News};
 use crate::workflow::words::time_of_day;
 
 /// How a start is given.
@@ -163,10 +163,12 @@ pub(crate) fn asked(
     mut meanwhile: impl FnMut() -> Result<(), WorkflowError>,
 ) -> Result<bool, WorkflowError> {
     let failed = |error: io::Error| WorkflowError::Failed(format!("failed to ask: {error}"));
-    let answered = host.ask(question).map_err(failed)?;
+    let answers = [("yes", "Authorize the start"), ("no", "Cancel: nothing starts")];
+    let answered = host.offer(question, &answers).map_err(failed)?;
     loop {
         match answered.recv_timeout(Duration::from_millis(50)) {
             Ok(answer) => {
+                host.news(&News::Answered);
                 let answer = answer.map_err(failed)?.unwrap_or_default();
                 return Ok(answer.trim().eq_ignore_ascii_case("yes"));
             }

@@ -31,12 +31,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("study", &["base", "numeric", "mission", "flight", "analysis"]),
     ("archive", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis", "gap"]),
     ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study"]),
+    ("live", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis"]),
     (
         "workflow",
         &[
             "base",
             "numeric",
             "mission",
+            "live",
             "skybrush_server",
             "campaign",
             "fleet",

@@ -21,10 +21,11 @@ use crate::fleet::slots::{Assignment, FLEET_FILE, FleetTable};
 use crate::link::clock::{Micros, S};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
+use crate::live::view::Step;
 use crate::mission::Plan;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::error::{WorkflowError, with_reasons};
-use crate::workflow::host::Host;
+use crate::workflow::host::{Host, News};
 use crate::workflow::made_by;
 
 /// What is wanted of the drones' logs.
@@ -120,6 +121,7 @@ pub(crate) fn bring(
     table: &FleetTable,
     wish: &Wish,
 ) -> Result<Vec<Brought>, WorkflowError> {
+    host.news(&News::Step(Step::Logs, "Waiting for the logs of all drones".to_owned()));
     let quiet = wish.quiet;
     let at = match wish.origin {
         LogOrigin::Real => folder.logs_of(LogOrigin::Real),

@@ -16,6 +16,7 @@ use crate::link::net::Net as _;
 use crate::numeric::upper_median;
 use crate::protocol::show::{CLEAR_TIME, StartConfig, flag};
 use crate::workflow::error::WorkflowError;
+use crate::workflow::host::News;
 use crate::workflow::words::time_of_day;
 
 /// A start that was written down is that of the flight in the air if it is no longer ago, or no
@@ -125,6 +126,7 @@ impl Crew<'_> {
     pub(crate) fn attach(&mut self, wait_s: f64) -> Result<Found, WorkflowError> {
         self.table = FleetTable::read(&self.folder.0)?;
         self.net.set_fleet(self.drones());
+        self.host.news(&News::Assigned(&self.table));
         self.attached = true;
         self.greet()?;
         self.hear_all(wait_s)?;

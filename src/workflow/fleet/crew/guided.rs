@@ -19,6 +19,7 @@ use crate::link::conversation::{Observer as _, run_all};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::host::News;
 use crate::workflow::fleet::interrupt::Choice;
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
@@ -128,6 +129,7 @@ impl<'a> Crew<'a> {
         start: &Start,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, WorkflowError> {
         let start_gps_ms = start.time().map_or(0, GpsTime::total_ms);
+        self.host.news(&News::Start(Some(start_gps_ms)));
         let frame = self.plan.site.frame();
         let mut conversations = BTreeMap::new();
         for line in &self.table.drones {

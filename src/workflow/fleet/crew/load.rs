@@ -12,6 +12,7 @@ use crate::fleet::ftp::sum::Sum;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::upload::{ShowLoad, Upload};
+use crate::live::view::Step;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::id::DroneId;
 use crate::protocol::show::SHOW_FILE;
@@ -29,6 +30,7 @@ pub(super) const MOST_SKYB: u64 = 1 << 20;
 impl Crew<'_> {
     /// Reads the required parameters, and mends them if allowed. Whether they are right.
     pub(crate) fn params(&mut self, may_change: bool) -> Result<bool, WorkflowError> {
+        self.step(Step::Parameters, "Waiting for every drone's parameters");
         // Who flies, or may be flying, keeps what it has.
         let in_the_air = self.net.in_the_air(self.drones(), true);
         let conversations = self
@@ -135,6 +137,10 @@ impl Crew<'_> {
 
     /// Loads the show onto every drone. The drones that refused, with their reasons.
     pub(crate) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, WorkflowError> {
+        self.step(
+            Step::Uploading,
+            "Waiting for every drone to take its show, origin and fence, and to read them back",
+        );
         let mut refused = self.remember_fence()?;
         let mut uploads = self.uploads()?;
         let count = uploads.len();

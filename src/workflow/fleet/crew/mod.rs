@@ -36,11 +36,12 @@ use crate::link::conversation::{Conversation, Observer, Progress as Share, run_a
 use crate::link::error::Refusal;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
+use crate::live::view::Step;
 use crate::mission::Plan;
 use crate::show::Show;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::fleet::interrupt::Choice;
-use crate::workflow::host::Host;
+use crate::workflow::host::{Host, News};
 
 /// Conversations at once per network: short ones do not disturb each other.
 const AT_ONCE: usize = 64;
@@ -163,6 +164,10 @@ impl<'a> Crew<'a> {
     /// Listens until as many drones as the plan has slots say where they are, or for `wait_s`.
     pub(crate) fn listen(&mut self, wait_s: f64) -> Result<(), WorkflowError> {
         let slots = self.plan.slots.len();
+        self.step(
+            Step::Listening,
+            &format!("Waiting for {slots} drones to say where they are, {wait_s:.0} s at most"),
+        );
         let until = self.net.now() + (wait_s * 1e6) as Micros;
         let settle = if self.is_virtual { 500 * MS } else { SETTLE };
         let mut complete = None;
@@ -190,6 +195,11 @@ impl<'a> Crew<'a> {
         Ok(())
     }
 
+    /// Tells that a step has begun, and what is waited for.
+    fn step(&self, step: Step, waits: &str) {
+        self.host.news(&News::Step(step, waits.to_owned()));
+    }
+
     /// Runs one conversation per drone.
     fn all<C: Conversation>(
         &mut self,
@@ -212,6 +222,7 @@ impl<'a> Crew<'a> {
 
     /// Asks for clocks and versions.
     pub(crate) fn greet(&mut self) -> Result<(), WorkflowError> {
+        self.step(Step::Greeting, "Waiting for every drone's clock and version");
         let conversations =
             self.telemetry.drones.keys().map(|drone| (*drone, Greet::new(*drone))).collect();
         self.all(conversations, AT_ONCE)?;
@@ -221,6 +232,7 @@ impl<'a> Crew<'a> {
     /// Finds which drone flies which slot: by the campaign's table, else by where they stand.
     /// Whether all is as it should be; problems are told.
     pub(crate) fn assign(&mut self, anew: bool) -> Result<bool, WorkflowError> {
+        self.step(Step::Assigning, "Finding which drone stands at which slot");
         let now = self.net.now();
         let problems: Vec<SlotProblem> = if FleetTable::path(&self.folder.0).exists() && !anew {
             self.table = FleetTable::read(&self.folder.0)?;
@@ -238,6 +250,7 @@ impl<'a> Crew<'a> {
             }
         };
         self.net.set_fleet(self.drones());
+        self.host.news(&News::Assigned(&self.table));
         if problems.is_empty() {
             return Ok(true);
         }
@@ -250,6 +263,10 @@ impl<'a> Crew<'a> {
 
     /// The table before a start.
     pub(crate) fn preflight(&mut self, wait_s: f64) -> Result<Preflight, WorkflowError> {
+        self.step(
+            Step::Preflight,
+            &format!("Waiting for every drone to be ready, {wait_s:.0} s at most; then the start time is set"),
+        );
         let until = self.net.now() + (wait_s * 1e6) as Micros;
         loop {
             self.host.check_stop()?;
@@ -262,6 +279,7 @@ impl<'a> Crew<'a> {
                 &Limits { guided: self.is_guided, ..Limits::default() },
                 now,
             );
+            self.host.news(&News::Preflight(&found));
             if found.go() || now >= until {
                 return Ok(found);
             }

@@ -16,8 +16,10 @@ use crate::link::conversation::Observer as _;
 use crate::link::error::NetError;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
+use crate::live::view::Step;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::fleet::interrupt::Interrupt;
+use crate::workflow::host::News;
 
 /// That there is no start is said so often, with 200 ms between, whatever is heard; and on until
 /// everyone knows, but no more often than this.
@@ -30,9 +32,12 @@ impl<'a> Crew<'a> {
         let refused =
             |error: crate::fleet::start::StartRefusal| WorkflowError::Failed(error.to_string());
         self.not_ordered_down()?;
+        self.step(Step::Start, "Waiting for every drone to take the start time");
         let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
             .map_err(refused)?;
         self.until_taken(&mut start)?;
+        self.host.news(&News::Start(start.time().map(GpsTime::total_ms)));
+        self.step(Step::Start, "Every drone has the start time: a person must authorize it");
         Ok(start)
     }
 
@@ -49,6 +54,7 @@ impl<'a> Crew<'a> {
             self.cancel(start)?;
             return Err(error);
         }
+        self.step(Step::Start, "Authorized: waiting for every drone to know, then they take off by themselves");
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))?;
         self.until_taken(start)
     }
@@ -102,6 +108,7 @@ impl<'a> Crew<'a> {
         self.tell_of_no_start(start)?;
         self.finish_orders()?;
         self.withdraw_start();
+        self.host.news(&News::Start(None));
         self.try_note("cancelled", &BTreeMap::new());
         Ok(())
     }
@@ -215,6 +222,9 @@ impl<'a> Crew<'a> {
 
     /// Watches a flight from here on.
     pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Eyes<'a> {
+        self.host.news(&News::Assigned(&self.table));
+        self.host.news(&News::Start(start_gps_ms));
+        self.step(Step::Flying, "Waiting for every drone to land; then their logs are downloaded");
         let telemetry = std::mem::take(&mut self.telemetry);
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));

@@ -1,0 +1,72 @@
+//! `--live`: a flight in a browser while it goes on.
+
+use std::io;
+use std::sync::Arc;
+
+use clap::Args;
+use rand::TryRng as _;
+use rand::rngs::SysRng;
+
+use super::context::Context;
+use super::exit::CommandError;
+use crate::campaign::FlightFolder;
+use crate::live::source::Source;
+use crate::live::station::Station;
+use crate::mission::Plan;
+use crate::workflow::live::{Address, LiveWish, Served, serve};
+
+/// How a page is served.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Live page")]
+pub(super) struct LiveArgs {
+    /// Serve a page that shows the flight as it happens, at 127.0.0.1:8700 or another IP address, port or
+    /// both; its address is printed
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1")]
+    live: Option<Address>,
+    /// Print a second address of the page, from which the start can be authorized and drones ordered down
+    #[arg(long, requires = "live")]
+    live_orders: bool,
+}
+
+/// A page that shows a flight, if one is wished for.
+pub(super) struct Live {
+    /// What it shows.
+    pub(super) station: Option<Arc<Station>>,
+    /// Whether it may order.
+    pub(super) orders: bool,
+    _served: Option<Served>,
+}
+
+/// Random bytes of the operating system.
+pub(super) fn random(bytes: &mut [u8]) -> io::Result<()> {
+    SysRng.try_fill_bytes(bytes).map_err(io::Error::other)
+}
+
+impl LiveArgs {
+    /// Refuses where there is nothing to show.
+    pub(super) fn refuse(&self, why: &str) -> Result<(), CommandError> {
+        match self.live {
+            Some(_) => Err(CommandError::Usage(format!("--live: {why}"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Serves the page of a flight, if one is wished for.
+    pub(super) fn open(
+        &self,
+        context: &Context,
+        folder: &FlightFolder,
+        plan: &Plan,
+    ) -> Result<Live, CommandError> {
+        let Some(address) = self.live else {
+            return Ok(Live { station: None, orders: false, _served: None });
+        };
+        let clock = Arc::clone(context.clock());
+        let station = Arc::new(Station::new(plan, folder.0.clone(), clock));
+        let wish = LiveWish { address, orders: self.live_orders, random };
+        let source = Arc::clone(&station);
+        let source: Arc<dyn Source> = source;
+        let served = serve(context, &folder.0, &source, &wish)?;
+        Ok(Live { station: Some(station), orders: self.live_orders, _served: Some(served) })
+    }
+}
