@@ -5,7 +5,7 @@ use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
 use super::corrections::Corrections;
 use super::hover::Hover;
-use super::input::{FlightInput, LogInput, TruthSeries};
+use super::input::{AtHand, FlightInput, LogInput, TruthSeries};
 use super::law::{LawKind, LawOf};
 use super::levelled;
 use super::map_statistics::HoverSeen;
@@ -72,20 +72,28 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         let said = with_causes(error, ": ");
         Cause::of_log(&said, &log.path.shown().to_string(), &input.shown(&log.path))
     };
-    let flight = match &log.table {
-        Some(mapping) => table::read(&log.path, mapping).map_err(|error| unusable(&error))?,
-        None => Flight::open(&log.path, flight_options).map_err(|error| unusable(&error))?,
+    let opened;
+    let flight = match (&log.at_hand, &log.table) {
+        (Some(AtHand(flight)), _) => &**flight,
+        (None, Some(mapping)) => {
+            opened = table::read(&log.path, mapping).map_err(|error| unusable(&error))?;
+            &opened
+        }
+        (None, None) => {
+            opened = Flight::open(&log.path, flight_options).map_err(|error| unusable(&error))?;
+            &opened
+        }
     };
     let mut warnings: Vec<Warning> = flight.warnings.iter().cloned().map(Warning::Log).collect();
 
     let targets = match &log.table {
-        Some(mapping) if flight.desired_up_mps.is_none() => steady(&flight, &mapping.steps),
-        _ => find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?,
+        Some(mapping) if flight.desired_up_mps.is_none() => steady(flight, &mapping.steps),
+        _ => find_targets(flight, slot.map(|(_, segments)| segments), &mut warnings)?,
     };
-    let elsewhere = elsewhere(&flight, &targets);
+    let elsewhere = elsewhere(flight, &targets);
     warnings.extend(elsewhere.clone().map(Warning::NothingOfPlan));
-    let corrected = windows::correct_tilt(&flight, &options.windows);
-    let mut stats = windows::measure(&flight, &corrected, &targets, &options.windows);
+    let corrected = windows::correct_tilt(flight, &options.windows);
+    let mut stats = windows::measure(flight, &corrected, &targets, &options.windows);
     let offset = options
         .offset
         .is_subtracted(input.true_updraft_mps)
@@ -104,13 +112,13 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         Some((_, segments)) if log.table.is_none() => windows::of_air(segments),
         _ => targets.clone(),
     };
-    let seen = Seen { flight: &flight, corrected: &corrected, targets: &of_air, windows: &stats };
+    let seen = Seen { flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
     let updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
         (None, None, _) => None,
         (_, _, Some(reason)) => Some(Err(reason.clone())),
         (Some(level), ..) => {
-            Some(levelled::measure(shared, level, &flight, &of_air, (number, &name)))
+            Some(levelled::measure(shared, level, flight, &of_air, (number, &name)))
         }
         (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
     };
@@ -126,12 +134,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         laws: None,
         line: None,
         partial_ladder: None,
-        trace: trace(&flight, &corrected, options.trace_points),
+        trace: trace(flight, &corrected, options.trace_points),
         warnings,
     };
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
-    let hover = HoverSeen::of(&flight, &corrected, &of_air);
-    let truth = true_air(&flight, &of_air);
+    let hover = HoverSeen::of(flight, &corrected, &of_air);
+    let truth = true_air(flight, &of_air);
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, truth })
 }
 

@@ -13,7 +13,7 @@ use super::wind::Leaning;
 use super::wind_forms::WindForms;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
-use crate::flight::Indicator;
+use crate::flight::{Flight, Indicator};
 use crate::flight::table::Mapping;
 use crate::mission::plan::{Plan, Purpose};
 
@@ -27,8 +27,20 @@ pub struct LogInput {
     pub path: PathBuf,
     /// Meaning of the columns, if the file is a table and not a DataFlash log.
     pub table: Option<Arc<Mapping>>,
+    /// The flight itself, if it is at hand and not in a file: then `path` is its name, and `slot` its slot.
+    pub at_hand: Option<AtHand>,
     /// Reason why the log is not to be used, if the caller has one: it is of another flight.
     pub refused: Option<String>,
+}
+
+/// A flight at hand; it is the same as itself alone.
+#[derive(Clone, Debug)]
+pub struct AtHand(pub Arc<Flight>);
+
+impl PartialEq for AtHand {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 /// One flight to analyse.

@@ -71,7 +71,7 @@ mod zero;
 
 pub use analyze::{AnalysisError, Progress, analyze, analyze_flight};
 pub use cause::Cause;
-pub use input::{FlightInput, LogInput, TruthSeries};
+pub use input::{AtHand, FlightInput, LogInput, TruthSeries};
 pub use law::LawKind;
 pub use levelled::Level;
 pub use options::{AnalysisOptions, OffsetRule};

@@ -32,6 +32,10 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
         let said = with_causes(error, ": ");
         Cause::of_log(&said, &log.path.shown().to_string(), &input.shown(&log.path))
     };
+    if !input.logs.is_empty() && input.logs.iter().all(|log| log.at_hand.is_some()) {
+        let slot = |log: &LogInput| log.slot.map_or(SlotMatch::Unplanned, SlotMatch::Slot);
+        return (input.logs.iter().map(slot).collect(), Vec::new());
+    }
     let opened: Vec<Result<Log, Cause>> = (input.logs.par_iter())
         .map(|log| Log::open(&log.path).map_err(|error| unreadable(log, &error)))
         .collect();

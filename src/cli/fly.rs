@@ -142,7 +142,7 @@ fn fly_target(
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             readable(&folder)?;
             let mut station = args.connect.open(context, links)?;
-            let live = args.live.open(context, &folder, &plan)?;
+            let live = args.live.open(context, &args.campaign, &folder, &plan)?;
             let host = LiveHost::new(context, live.station.clone(), live.orders);
             let mut tap = Tap::new(&mut station, live.station.clone());
             let mut handler = order_handler(&host, &mut tap, &folder);

@@ -1,6 +1,7 @@
 //! `--live`: a flight in a browser while it goes on.
 
 use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
@@ -13,10 +14,10 @@ use crate::campaign::FlightFolder;
 use crate::live::source::Source;
 use crate::live::station::Station;
 use crate::mission::Plan;
-use crate::workflow::live::{Address, LiveWish, Served, serve};
+use crate::workflow::live::{Address, AirWatch, AirWish, LiveWish, Served, serve};
 
 /// How a page is served.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Live page")]
 pub(super) struct LiveArgs {
     /// Serve a page that shows the flight as it happens, at 127.0.0.1:8700 or another IP address, port or
@@ -26,6 +27,10 @@ pub(super) struct LiveArgs {
     /// Print a second address of the page, from which the start can be authorized and drones ordered down
     #[arg(long, requires = "live")]
     live_orders: bool,
+    /// The analysis.json with the calibration by which the page tells the air in a measurement flight
+    /// [default: the campaign's]
+    #[arg(long, value_name = "FILE", requires = "live")]
+    law: Option<PathBuf>,
 }
 
 /// A page that shows a flight, if one is wished for.
@@ -34,6 +39,7 @@ pub(super) struct Live {
     pub(super) station: Option<Arc<Station>>,
     /// Whether it may order.
     pub(super) orders: bool,
+    _air: Option<AirWatch>,
     _served: Option<Served>,
 }
 
@@ -55,18 +61,21 @@ impl LiveArgs {
     pub(super) fn open(
         &self,
         context: &Context,
+        campaign: &Path,
         folder: &FlightFolder,
         plan: &Plan,
     ) -> Result<Live, CommandError> {
         let Some(address) = self.live else {
-            return Ok(Live { station: None, orders: false, _served: None });
+            return Ok(Live { station: None, orders: false, _air: None, _served: None });
         };
         let clock = Arc::clone(context.clock());
         let station = Arc::new(Station::new(plan, folder.0.clone(), clock));
         let wish = LiveWish { address, orders: self.live_orders, random };
+        let wish_of_air = AirWish { campaign: campaign.to_owned(), law: self.law.clone() };
+        let air = AirWatch::begin(context, &station, plan, &wish_of_air)?;
         let source = Arc::clone(&station);
         let source: Arc<dyn Source> = source;
         let served = serve(context, &folder.0, &source, &wish)?;
-        Ok(Live { station: Some(station), orders: self.live_orders, _served: Some(served) })
+        Ok(Live { station: Some(station), orders: self.live_orders, _air: air, _served: Some(served) })
     }
 }

@@ -19,5 +19,6 @@ pub mod server;
 pub mod source;
 pub mod station;
 pub mod tap;
+pub mod thin;
 pub mod trouble;
 pub mod view;

@@ -13,9 +13,11 @@ use super::facts::{Facts, centi};
 use super::http::guard::Rank;
 use super::orders::{Refused, Said as Answered, Wish};
 use super::source::Source;
+use super::thin::Thin;
 use super::trouble::{Looked, trouble};
 use super::view::{AirView, DroneView, Level, PreflightView, Question, Said, Step, View};
 use crate::base::causes::with_causes;
+use crate::base::time::GpsTime;
 use crate::fleet::abort::Action;
 use crate::fleet::messages::mode_name;
 use crate::fleet::order_handler::Notice;
@@ -24,6 +26,7 @@ use crate::fleet::preflight::{COLUMNS, Preflight};
 use crate::fleet::slots::{FleetTable, geodetic};
 use crate::fleet::telemetry::{Drone, Telemetry};
 use crate::fleet::watch::{Flying, Limits, Monitor};
+use crate::flight::Flight;
 use crate::link::clock::{Clock, Micros, S};
 use crate::link::conversation::Observer as _;
 use crate::link::id::DroneId;
@@ -33,6 +36,13 @@ use crate::protocol::show::Stage;
 
 /// Sentences that are kept.
 const MOST_SAID: usize = 300;
+/// Bytes a second that streams for the air may cost a link.
+const LINK_BYTES_PER_S: f64 = 50_000.0;
+/// Bytes of one round of a drone: ATTITUDE, GLOBAL_POSITION_INT and SERVO_OUTPUT_RAW.
+const STREAM_BYTES: f64 = 125.0;
+/// Rounds a second: at most, and at least.
+const FASTEST_HZ: f64 = 4.0;
+const SLOWEST_HZ: f64 = 1.0;
 /// Charge is a rate after so long in the air, us.
 const RATED: Micros = 60 * S;
 /// Charge that was used must be so much to be a rate, %.
@@ -68,6 +78,8 @@ struct Now {
     charge: BTreeMap<DroneId, (Micros, f64)>,
     air: Option<AirView>,
     air_of: BTreeMap<u16, (f64, f64)>,
+    /// Channels for the air, if it is wanted.
+    thin: Option<Thin>,
 }
 
 impl std::fmt::Debug for Station {
@@ -99,6 +111,7 @@ impl Station {
             charge: BTreeMap::new(),
             air: None,
             air_of: BTreeMap::new(),
+            thin: None,
         };
         Self { plan: plan.clone(), folder, clock, limits, now: Mutex::new(now) }
     }
@@ -110,15 +123,39 @@ impl Station {
     /// A message has come.
     pub fn hear(&self, received: &Received) {
         let mut now = self.lock();
+        let now = &mut *now;
         now.monitor.on_message(self.clock.now(), received);
-        self.take_events(&mut now);
+        if let Some(thin) = &mut now.thin {
+            thin.hear(&now.monitor.telemetry, received);
+        }
+        now.take_events();
     }
 
-    fn take_events(&self, now: &mut Now) {
-        for told in now.monitor.take_events() {
-            now.words.insert(told.drone, told.event.to_string());
-        }
-        let _ = self;
+    /// Keeps what the air is told from, of drones with so many motors, from now on.
+    pub fn keep_air(&self, motors: usize) {
+        self.lock().thin = Some(Thin::new(motors));
+    }
+
+    /// How often drones are to tell outputs and attitude, us; `None`: nobody wants them.
+    pub fn stream_every(&self) -> Option<Micros> {
+        self.lock().thin.as_ref()?;
+        let drones = self.plan.slots.len().max(1) as f64;
+        let rate_hz = (LINK_BYTES_PER_S / (STREAM_BYTES * drones)).clamp(SLOWEST_HZ, FASTEST_HZ);
+        Some((S as f64 / rate_hz) as Micros)
+    }
+
+    /// Flights so far, from a show time on, s, by slot; `None` while no start is known.
+    pub fn flights(&self, from_s: f64) -> Option<Vec<(u16, Flight)>> {
+        let now = self.lock();
+        let (start, thin) = (GpsTime::from_total_ms(now.start_gps_ms?)?, now.thin.as_ref()?);
+        let flight = |(drone, slot)| Some((slot, thin.flight(drone, start, from_s)?));
+        Some(now.monitor.slots().filter_map(flight).collect())
+    }
+
+    /// Step of the station, and the time of the show, s.
+    pub fn moment(&self) -> (Step, Option<f64>) {
+        let now = self.lock();
+        (now.step, now.monitor.flying().filter_map(|(_, of)| of.show_s).reduce(f64::max))
     }
 
     /// Which drone flies which slot is known.
@@ -278,7 +315,7 @@ impl Source for Station {
         let mut now = self.lock();
         let at = self.clock.now();
         now.monitor.stop(at);
-        self.take_events(&mut now);
+        now.take_events();
         now.look_at_charge(at);
         let flying: BTreeMap<DroneId, Flying> = now.monitor.flying().collect();
         let slots: BTreeMap<DroneId, u16> = now.monitor.slots().collect();
@@ -323,6 +360,12 @@ impl Source for Station {
 }
 
 impl Now {
+    fn take_events(&mut self) {
+        for told in self.monitor.take_events() {
+            self.words.insert(told.drone, told.event.to_string());
+        }
+    }
+
     /// Remembers the charge at take-off.
     fn look_at_charge(&mut self, at: Micros) {
         let Self { monitor, charge, .. } = self;

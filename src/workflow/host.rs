@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::clock::{Clock, SystemClock};
+use super::clock::{Clock, Micros, SystemClock};
 use super::error::WorkflowError;
 use crate::base::file::sweep_below;
 use crate::base::plain::Shown as _;
@@ -99,6 +99,11 @@ pub trait Host: Send + Sync {
     /// Reports where a flight stands, for those who show it.
     fn news(&self, news: &News<'_>) {
         let _ = news;
+    }
+
+    /// How often drones in flight are asked for attitude and outputs, us; `None`: they are not.
+    fn stream_every(&self) -> Option<Micros> {
+        None
     }
 
     /// Number of times that the work was told to stop: a person who insists while drones are in the

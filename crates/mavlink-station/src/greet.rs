@@ -54,6 +54,14 @@ pub fn ask_time(drone: DroneId) -> MavMessage {
     ask(drone, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, SYSTEM_TIME, TIME_EVERY_US)
 }
 
+/// Messages from which the air is told: attitude, position with velocity, outputs.
+const AIR: [f32; 3] = [30.0, 33.0, 36.0];
+
+/// Messages that ask a vehicle for attitude, position and outputs every so often; 0: as it does by itself.
+pub fn ask_air(drone: DroneId, every: Micros) -> [MavMessage; 3] {
+    AIR.map(|id| ask(drone, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, id, every as f32))
+}
+
 impl Conversation for Greet {
     type Done = Greeted;
 

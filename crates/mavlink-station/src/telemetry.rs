@@ -88,6 +88,26 @@ pub struct Health {
     pub battery_percent: Option<u8>,
 }
 
+/// Attitude of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attitude {
+    /// Roll, rad, right side down positive.
+    pub roll_rad: f64,
+    /// Pitch, rad, nose up positive.
+    pub pitch_rad: f64,
+    /// Time of the measurement, ms since the vehicle was switched on.
+    pub boot_ms: u32,
+}
+
+/// Outputs of a vehicle's first eight channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outputs {
+    /// Pulse widths, us; 0: no output.
+    pub pulses_us: [u16; 8],
+    /// Time of the outputs, us since the vehicle was switched on; it begins anew after 71 min.
+    pub boot_us: u32,
+}
+
 /// A text that a vehicle sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
@@ -120,6 +140,10 @@ pub struct Drone {
     pub gps: Heard<Gps>,
     /// State of the battery and the arming checks.
     pub health: Heard<Health>,
+    /// Attitude of the vehicle, where it was asked for.
+    pub attitude: Heard<Attitude>,
+    /// Pulse widths of its outputs, where they were asked for.
+    pub outputs: Heard<Outputs>,
     /// Strength of the radio's signal, % of the best, where the vehicle passes it on.
     pub signal: Heard<u8>,
     /// Clock of the vehicle.
@@ -213,6 +237,25 @@ impl Drone {
                 self.booted = booted.filter(|_| time.time_unix_usec > 0).or(self.booted);
             }
             MavMessage::STATUSTEXT(text) => self.text(now, text),
+            MavMessage::ATTITUDE(at) => {
+                self.board_time(at.time_boot_ms);
+                let (roll_rad, pitch_rad) = (f64::from(at.roll), f64::from(at.pitch));
+                let boot_ms = at.time_boot_ms;
+                self.attitude = Some((now, Attitude { roll_rad, pitch_rad, boot_ms }));
+            }
+            MavMessage::SERVO_OUTPUT_RAW(out) if out.port == 0 => {
+                let pulses_us = [
+                    out.servo1_raw,
+                    out.servo2_raw,
+                    out.servo3_raw,
+                    out.servo4_raw,
+                    out.servo5_raw,
+                    out.servo6_raw,
+                    out.servo7_raw,
+                    out.servo8_raw,
+                ];
+                self.outputs = Some((now, Outputs { pulses_us, boot_us: out.time_usec }));
+            }
             MavMessage::RADIO_STATUS(radio) if radio.rssi != u8::MAX => {
                 self.signal = Some((now, strength(radio.rssi)));
             }
@@ -226,6 +269,11 @@ impl Drone {
             }
             _ => {}
         }
+    }
+
+    /// The board's time that was heard last, ms since the vehicle was switched on.
+    pub fn board_ms(&self) -> Option<u32> {
+        self.board_ms
     }
 
     /// Takes a time of its board. After a restart nothing that its old clock has said holds: what was

@@ -175,7 +175,7 @@ fn with_orders(
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let mut station = step_station(context, args)?;
-    let live = live.open(context, &folder, &plan)?;
+    let live = live.open(context, &args.campaign, &folder, &plan)?;
     let host = LiveHost::new(context, live.station.clone(), live.orders);
     let mut tap = Tap::new(&mut station, live.station.clone());
     let mut handler = order_handler(&host, &mut tap, &folder);

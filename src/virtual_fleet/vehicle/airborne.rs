@@ -38,6 +38,19 @@ impl<'w> Airborne<'w> {
         self.flight.flight.motion().velocity_mps
     }
 
+    /// Roll, right side down, and pitch, nose up, rad.
+    pub(super) fn lean_rad(&self) -> [f64; 2] {
+        let rotation = &self.flight.flight.motion().rotation;
+        let roll = rotation[(2, 1)].atan2(rotation[(2, 2)]);
+        [roll, rotation[(2, 0)].clamp(-1.0, 1.0).asin()]
+    }
+
+    /// Pulse widths of the first eight motors, us.
+    pub(super) fn pulses_us(&self) -> [u16; 8] {
+        let pulses = self.flight.flight.pulses_us();
+        std::array::from_fn(|motor| pulses.get(motor).copied().unwrap_or(0))
+    }
+
     pub(super) fn battery(&self) -> Option<BatteryReading> {
         self.flight.flight.battery()
     }

@@ -9,19 +9,23 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::protocol::show::{self, Status};
 
 /// Messages that can be sent regularly: id, us between two unless asked for otherwise (0: never).
-const STREAMS: [(u32, Micros); 6] = [
+const STREAMS: [(u32, Micros); 8] = [
     (HEARTBEAT, 1_000_000),
     (SYS_STATUS, 1_000_000),
     (SYSTEM_TIME, 0),
     (GPS_RAW_INT, 1_000_000),
+    (ATTITUDE, 0),
     (GLOBAL_POSITION_INT, 500_000),
+    (SERVO_OUTPUT_RAW, 0),
     (DATA16, 500_000),
 ];
 pub(super) const HEARTBEAT: u32 = 0;
 pub(super) const SYS_STATUS: u32 = 1;
 pub(super) const SYSTEM_TIME: u32 = 2;
 pub(super) const GPS_RAW_INT: u32 = 24;
+pub(super) const ATTITUDE: u32 = 30;
 pub(super) const GLOBAL_POSITION_INT: u32 = 33;
+pub(super) const SERVO_OUTPUT_RAW: u32 = 36;
 pub(super) const DATA16: u32 = 169;
 pub(super) const AUTOPILOT_VERSION: u32 = 148;
 /// Capability bit of parameters as floats, which newer descriptions of MAVLink rename.
@@ -111,6 +115,10 @@ pub(super) struct Telling {
     /// Velocity to the north, to the east and up, m/s.
     pub(super) velocity_mps: Vector3<f64>,
     pub(super) heading_deg: f64,
+    /// Roll, right side down, and pitch, nose up, rad.
+    pub(super) lean_rad: [f64; 2],
+    /// Pulse widths of the motors, us; 0: no output.
+    pub(super) pulses_us: [u16; 8],
     pub(super) volts: f64,
     pub(super) amps: f64,
     pub(super) percent: f64,
@@ -130,6 +138,14 @@ impl Telling {
             }),
             GPS_RAW_INT => self.gps_raw(),
             GLOBAL_POSITION_INT => self.position(),
+            ATTITUDE => MavMessage::ATTITUDE(dialect::ATTITUDE_DATA {
+                time_boot_ms: self.boot_ms,
+                roll: self.lean_rad[0] as f32,
+                pitch: self.lean_rad[1] as f32,
+                yaw: self.heading_deg.to_radians() as f32,
+                ..Default::default()
+            }),
+            SERVO_OUTPUT_RAW => self.outputs(),
             DATA16 => {
                 let status = self.status?;
                 MavMessage::DATA16(dialect::DATA16_DATA {
@@ -239,6 +255,23 @@ impl Telling {
             vy: cms(self.velocity_mps.y),
             vz: cms(-self.velocity_mps.z),
             hdg: (self.heading_deg.rem_euclid(360.0) * 100.0) as u16,
+        })
+    }
+
+    fn outputs(&self) -> MavMessage {
+        let [one, two, three, four, five, six, seven, eight] = self.pulses_us;
+        MavMessage::SERVO_OUTPUT_RAW(dialect::SERVO_OUTPUT_RAW_DATA {
+            // The board's time in us, which begins anew after 71 min.
+            time_usec: self.boot_ms.wrapping_mul(1000),
+            servo1_raw: one,
+            servo2_raw: two,
+            servo3_raw: three,
+            servo4_raw: four,
+            servo5_raw: five,
+            servo6_raw: six,
+            servo7_raw: seven,
+            servo8_raw: eight,
+            ..Default::default()
         })
     }
 

@@ -31,6 +31,8 @@ impl VirtualVehicle<'_> {
             height_m: position_m.z - self.stands_m.z,
             velocity_mps: frame.to_neu(velocity_mps),
             heading_deg: frame.orientation_deg,
+            lean_rad: self.airborne.as_ref().map_or([0.0; 2], Airborne::lean_rad),
+            pulses_us: self.airborne.as_ref().map_or([0; 8], Airborne::pulses_us),
             volts: battery.map_or(10.5 + 0.02 * percent, |battery| battery.volts),
             amps: battery.map_or(0.5, |battery| battery.amps),
             percent,

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use crate::live::station::Station;
 use crate::live::view::{Level, Step};
-use crate::workflow::clock::Clock;
+use crate::workflow::clock::{Clock, Micros};
 use crate::workflow::host::{Answer, Host, News, Progress, Transfer};
 
 /// A host that tells pages what it tells people.
@@ -133,6 +133,10 @@ impl Host for LiveHost<'_> {
             }
         }
         self.host.news(news);
+    }
+
+    fn stream_every(&self) -> Option<Micros> {
+        self.station.as_ref()?.stream_every()
     }
 
     fn interruptions(&self) -> u32 {

@@ -82,6 +82,7 @@ pub(crate) fn serve(
     // A page that was open finds the station again where it was.
     let ports = match wish.address.port {
         Some(port) => vec![port],
+        None if secrets.port == 0 => vec![USUAL_PORT, 0],
         None => vec![secrets.port, USUAL_PORT, 0],
     };
     let setup = || Setup {

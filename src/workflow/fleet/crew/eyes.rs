@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::file::FileError;
-use crate::fleet::greet::ask_time;
+use crate::fleet::greet::{ask_air, ask_time};
 use crate::fleet::journal::{Entry, Journal};
-use crate::fleet::telemetry::Telemetry;
+use crate::fleet::telemetry::{Drone, Telemetry};
 use crate::fleet::watch::Monitor;
 use crate::link::clock::{Micros, S};
 use crate::link::conversation::Observer;
@@ -29,7 +29,15 @@ pub(super) struct Eyes<'a> {
     interrupt: Interrupt<'a>,
     /// When drones that have restarted are asked for their time again.
     next_ask: Micros,
+    /// When drones are asked for streams again, and those that were.
+    next_stream: Micros,
+    asked: BTreeSet<DroneId>,
 }
+
+/// A drone that was to send its outputs and has not for so long is asked again.
+const QUIET: Micros = 5 * S;
+/// Drones that are asked at a time.
+const MOST_ASKED: usize = 64;
 
 impl<'a> Eyes<'a> {
     pub(super) fn new(
@@ -51,6 +59,8 @@ impl<'a> Eyes<'a> {
             finishes,
             interrupt,
             next_ask: 0,
+            next_stream: 0,
+            asked: BTreeSet::new(),
         }
     }
 
@@ -93,6 +103,37 @@ impl<'a> Eyes<'a> {
         for drone in self.monitor.telemetry.timeless(now) {
             // It is asked again.
             drop(net.send(drone, &ask_time(drone)));
+        }
+    }
+
+    /// Asks drones of the flight for what the air is told from, as long as they do not send it.
+    pub(super) fn ask_streams(&mut self, net: &mut dyn Net) {
+        let now = net.now();
+        let Some(every) = self.host.stream_every().filter(|_| now >= self.next_stream) else {
+            return;
+        };
+        self.next_stream = now + S;
+        let quiet = |of: &&Drone| of.outputs.is_none_or(|(at, _)| now > at + QUIET);
+        let drones: Vec<DroneId> = (self.monitor.slots())
+            .map(|(drone, _)| drone)
+            .filter(|drone| self.monitor.telemetry.get(*drone).filter(quiet).is_some())
+            .take(MOST_ASKED)
+            .collect();
+        for drone in drones {
+            for message in ask_air(drone, every) {
+                // It is asked again.
+                drop(net.send(drone, &message));
+            }
+            self.asked.insert(drone);
+        }
+    }
+
+    /// Lets drones send as they do by themselves: logs have the link then.
+    pub(super) fn end_streams(&mut self, net: &mut dyn Net) {
+        for drone in std::mem::take(&mut self.asked) {
+            for message in ask_air(drone, 0) {
+                drop(net.send(drone, &message));
+            }
         }
     }
 

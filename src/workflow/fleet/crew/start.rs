@@ -189,6 +189,7 @@ impl<'a> Crew<'a> {
             }
             eyes.stop(self.net.now());
             eyes.ask_times(&mut self.net);
+            eyes.ask_streams(&mut self.net);
             let going_on = ordered.values().any(|going_on| *going_on);
             let down = |drone: &DroneId| {
                 let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
@@ -215,6 +216,7 @@ impl<'a> Crew<'a> {
                 });
             }
         };
+        eyes.end_streams(&mut self.net);
         self.host.set_in_flight(None);
         let alarms = self.close(eyes);
         outcome.and(alarms)

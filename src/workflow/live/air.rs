@@ -1,0 +1,253 @@
+//! The air while drones are in it: telemetry through the same analysis as logs, again and again.
+//!
+//! It runs on a thread of its own, and waits nineteen times as long as it works: it takes a twentieth of one processor,
+//! however many drones there are.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::analysis::{AtHand, LogInput, analyze_flight};
+use crate::base::plain::Shown as _;
+use crate::campaign::read_json;
+use crate::live::facts::centi;
+use crate::live::station::Station;
+use crate::live::view::{AirMap, AirView, Step};
+use crate::mission::Plan;
+use crate::mission::plan::{Purpose, SegmentKind};
+use crate::workflow::analyze::Settings;
+use crate::workflow::analyze::one_input;
+use crate::workflow::clock::{Clock, Micros, S};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::find::{Found, Work, find};
+use crate::workflow::host::Host;
+
+/// A first look is taken so long after the hover has begun, s.
+const FIRST_S: f64 = 25.0;
+/// What is older does not count, s: the air of now is asked for.
+const WINDOW_S: f64 = 180.0;
+/// Looks are no closer together, us.
+const CLOSEST: Micros = 4 * S;
+/// Time between looks, in times that one takes.
+const SHARE: u32 = 19;
+/// Motors of a vehicle, on its first outputs: all that updraft knows have four.
+const MOTORS: usize = 4;
+/// Half the width of the 95 % interval, standard errors.
+const WIDTH: f64 = 1.96;
+
+/// What the air is told with.
+#[derive(Clone, Debug)]
+pub(crate) struct AirWish {
+    /// Folder of the campaign.
+    pub(crate) campaign: PathBuf,
+    /// An analysis.json with the calibration; absent: the campaign's own.
+    pub(crate) law: Option<PathBuf>,
+}
+
+/// A thread that looks at the air; dropped, it ends.
+pub(crate) struct AirWatch {
+    shared: Arc<Shared>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+struct Shared {
+    stop: AtomicBool,
+    guard: Mutex<()>,
+    bell: Condvar,
+}
+
+impl AirWatch {
+    /// Begins to look, if the flight measures and there is a calibration; says why not.
+    ///
+    /// # Errors
+    /// If a calibration was named and cannot be read.
+    pub(crate) fn begin(
+        host: &dyn Host,
+        station: &Arc<Station>,
+        plan: &Plan,
+        wish: &AirWish,
+    ) -> Result<Option<Self>, WorkflowError> {
+        let mut work = Work::new(&wish.campaign);
+        find(&wish.campaign, None, &mut work)?;
+        let Some(found) = work.flights.into_iter().find(|found| found.name == plan.name) else {
+            return Ok(None);
+        };
+        if found.purpose != Some(Purpose::Measurement) {
+            return Ok(None);
+        }
+        let own = wish.campaign.join("analysis.json");
+        let path = wish.law.as_ref().unwrap_or(&own);
+        let reference = match calibration(path) {
+            Ok(Some(reference)) => reference,
+            Ok(None) if wish.law.is_none() => {
+                host.say(
+                    "the page shows no air: the campaign has no analysed calibration (`updraft \
+                     analyze`, or --law with another campaign's analysis.json)",
+                );
+                return Ok(None);
+            }
+            Ok(None) => {
+                return Err(WorkflowError::Usage(format!(
+                    "{} has no calibration whose laws could tell the air",
+                    path.shown()
+                )));
+            }
+            Err(error) if wish.law.is_none() => {
+                host.say(&format!("the page shows no air: {error}"));
+                return Ok(None);
+            }
+            Err(error) => return Err(error),
+        };
+        station.keep_air(MOTORS);
+        let shared = Arc::new(Shared {
+            stop: AtomicBool::new(false),
+            guard: Mutex::default(),
+            bell: Condvar::new(),
+        });
+        let (clock, station, of) =
+            (Arc::clone(host.clock()), Arc::clone(station), Arc::clone(&shared));
+        let body = move || watch(&of, &clock, &station, &found, &reference);
+        let thread = std::thread::Builder::new().name("live air".to_owned()).spawn(body);
+        let thread = thread.map_err(|error| {
+            WorkflowError::Failed(format!("failed to start a thread: {error}"))
+        })?;
+        Ok(Some(Self { shared, thread: Some(thread) }))
+    }
+}
+
+impl Drop for AirWatch {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::SeqCst);
+        self.shared.bell.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A thread that has panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    fn is_over(&self) -> bool {
+        self.stop.load(Ordering::SeqCst)
+    }
+
+    fn wait(&self, time: Duration) {
+        let guard = self.guard.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.bell.wait_timeout_while(guard, time, |()| !self.is_over());
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+fn calibration(path: &Path) -> Result<Option<FlightAnalysis>, WorkflowError> {
+    let analysis: Analysis = read_json(path)?;
+    let usable =
+        |flight: &FlightAnalysis| flight.purpose == Purpose::Calibration && flight.flock.is_some();
+    Ok(analysis.flights.into_iter().find(usable))
+}
+
+/// Show times of the flight's hover, s.
+fn hover_s(plan: &Plan) -> Option<[f64; 2]> {
+    let segments = plan.groups.iter().flat_map(|group| &group.segments);
+    let hovers = segments.filter(|segment| segment.kind == SegmentKind::Hover);
+    hovers
+        .map(|segment| [segment.start_ms as f64 / 1000.0, segment.end_ms as f64 / 1000.0])
+        .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+}
+
+fn watch(
+    shared: &Shared,
+    clock: &Arc<dyn Clock>,
+    station: &Station,
+    found: &Found,
+    reference: &FlightAnalysis,
+) {
+    let Some(plan) = &found.plan else { return };
+    let Some([begins_s, ends_s]) = hover_s(plan) else { return };
+    // The station's own work has the other processors.
+    let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return };
+    let settings = Settings::default();
+    while !shared.is_over() {
+        let (step, show_s) = station.moment();
+        let flown = show_s.filter(|_| step == Step::Flying);
+        let Some(show_s) = flown.filter(|show_s| (begins_s + FIRST_S..=ends_s).contains(show_s))
+        else {
+            shared.wait(Duration::from_secs(1));
+            continue;
+        };
+        let begun = clock.now();
+        let from_s = (show_s - WINDOW_S).max(begins_s);
+        let logs = station.flights(from_s).unwrap_or_default().into_iter().map(|(slot, flight)| {
+            LogInput {
+                slot: Some(slot),
+                path: flight.source.clone(),
+                at_hand: Some(AtHand(Arc::new(flight))),
+                ..LogInput::default()
+            }
+        });
+        let found = Found { logs: logs.collect(), ..found.clone() };
+        if !found.logs.is_empty() {
+            let work = Work::default();
+            let input = one_input(&work, &found);
+            let looked = pool.install(|| {
+                analyze_flight(&input, &settings.options, Some(reference), &|_, _| {})
+            });
+            // Too little was heard yet, for example: the next look may have more.
+            if let Some(map) = looked.ok().and_then(|flight| flight.map) {
+                let rate_hz =
+                    station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
+                let (view, of) = shown(&map, [from_s, show_s], rate_hz);
+                station.air(Some(view), of);
+            }
+        }
+        let took = clock.now().saturating_sub(begun);
+        shared.wait(Duration::from_micros((took * u64::from(SHARE)).max(CLOSEST)));
+    }
+}
+
+/// What of a map is shown: the latest values.
+fn shown(
+    map: &UpdraftMap,
+    [from_s, to_s]: [f64; 2],
+    rate_hz: f64,
+) -> (AirView, BTreeMap<u16, (f64, f64)>) {
+    let mut of = BTreeMap::new();
+    let mut latest_s = from_s;
+    for drone in &map.drones {
+        let together = !drone.posterior_mps.is_empty();
+        let values = if together { &drone.posterior_mps } else { &drone.updraft_mps };
+        let errors = if together { &drone.posterior_sd_mps } else { &drone.sd_mps };
+        let last = values.iter().enumerate().rev().find_map(|(at, value)| Some((at, (*value)?)));
+        if let (Some(slot), Some((at, value))) = (drone.slot, last) {
+            let error = errors.get(at).copied().flatten().unwrap_or(drone.mean.se);
+            of.insert(slot, (value, error));
+            latest_s = latest_s.max(map.time_s.get(at).copied().unwrap_or(latest_s));
+        }
+    }
+    let posterior = map.posterior.as_ref();
+    let fleet = posterior.and_then(|posterior| posterior.fleet);
+    let grid = posterior.and_then(|posterior| posterior.grid.as_ref()).and_then(|grid| {
+        let (x, y) = (grid.x_m.first()?, grid.y_m.first()?);
+        let values = grid.updraft_mps.last()?;
+        Some(AirMap {
+            origin_m: [*x, *y],
+            step_m: grid.x_m.get(1).map_or(1.0, |next| next - x),
+            columns: grid.x_m.len(),
+            values_mps: values.iter().flatten().map(|value| value.map(centi)).collect(),
+        })
+    });
+    let view = AirView {
+        provisional: true,
+        time_s: latest_s,
+        fleet_mps: fleet.map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se].map(centi)),
+        map: grid,
+        note: format!(
+            "From telemetry at {rate_hz:.1} Hz: the mean is over the last {:.0} s, the colours are 10 s means. \
+             The logs tell it again, and better.",
+            to_s - from_s
+        ),
+    };
+    (view, of)
+}
