@@ -48,6 +48,9 @@ const RATED: Micros = 60 * S;
 /// Charge that was used must be so much to be a rate, %.
 const RATED_PERCENT: f64 = 1.0;
 
+/// A drone's text is shown so long, us.
+const TEXT_SHOWN: Micros = 30 * S;
+
 /// Answer of a person at a page.
 type Line = io::Result<Option<String>>;
 
@@ -236,7 +239,7 @@ impl Station {
         let owned = |(word, does): &(&str, &str)| ((*word).to_owned(), (*does).to_owned());
         now.question = Some(Question {
             number: now.questions,
-            text: text.trim().to_owned(),
+            text: plainly(text),
             answers: answers.iter().map(owned).collect(),
         });
         now.answers = Some(send);
@@ -297,6 +300,12 @@ impl Station {
             _ => Err(Refused::Nothing("it was answered already".to_owned())),
         }
     }
+}
+
+/// A question without what it says of a keyboard: its first sentence that asks.
+fn plainly(text: &str) -> String {
+    let text = text.trim();
+    text.split_inclusive('?').next().unwrap_or(text).to_owned()
 }
 
 fn word(action: Action) -> &'static str {
@@ -453,6 +462,7 @@ impl Station {
         });
         if view.words.is_empty()
             && let Some(text) = state.texts.back()
+            && at < text.at + TEXT_SHOWN
         {
             view.words.clone_from(&text.text);
         }

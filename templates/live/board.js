@@ -11,9 +11,10 @@ function makeRow(key) {
   const pick = document.createElement("input");
   pick.type = "checkbox";
   pick.addEventListener("change", () => choose(key, pick.checked));
-  const cells = Array.from({ length: 12 }, (_, index) => {
+  const cells = Array.from({ length: 11 }, (_, index) => {
     const cell = document.createElement("td");
     if (index === 0) { cell.className = "pick"; cell.append(pick); }
+    if (index === 3) cell.className = "words";
     row.append(cell);
     return cell;
   });
@@ -45,14 +46,15 @@ function drawRow(drone) {
   const air = drone.air_mps === null ? "–" : `${signed(drone.air_mps, 2)} ± ${fixed(drone.air_se_mps, 2)}`;
   const signal = drone.signal_percent !== null ? ` · ${fixed(drone.signal_percent, 0)} %` : "";
   const loss = drone.loss_percent === null ? "–" : `${fixed(drone.loss_percent, 0)} %`;
+  /* The identifier is named where it is not the slot's own number. */
+  const slot = drone.slot === null ? `drone ${drone.drone}`
+    : drone.drone && drone.drone !== String(drone.slot) ? `${drone.slot} (drone ${drone.drone})` : String(drone.slot);
+  const parts = [drone.trouble, drone.order, drone.words].filter((text) => text && text !== drone.stage);
   [
-    drone.slot === null ? "–" : String(drone.slot), drone.drone ?? "–", drone.stage || "–", null,
-    loss + signal, gps, battery + minutes,
-    drone.place_m ? `${fixed(drone.place_m[2], 1)} m` : "–",
+    slot, drone.stage || "–", parts.filter((text, i) => parts.indexOf(text) === i).join(" · "), null, loss + signal, gps,
+    battery + minutes, drone.place_m ? `${fixed(drone.place_m[2], 1)} m` : "–",
     drone.distance_m === null ? "–" : `${fixed(drone.distance_m, 1)} m`, air,
   ].forEach((text, index) => { if (text !== null) setText(cells[index + 1], text); });
-  const parts = [drone.trouble, drone.order, drone.words].filter((text) => text);
-  setText(cells[11], parts.filter((text, i) => parts.indexOf(text) === i).join(" · "));
 }
 
 /** How long ago each drone was heard: it grows without a word from the station. */

@@ -16,6 +16,7 @@ mod fleet;
 mod flight;
 mod gap;
 mod house;
+mod live;
 mod mission;
 mod report;
 mod skybrush_server;

@@ -79,7 +79,7 @@ impl Browser {
                 "--disable-component-update",
                 "--force-color-profile=srgb",
                 // Whatever asks for a name gets none: no test depends on a network.
-                "--host-resolver-rules=MAP * ~NOTFOUND",
+                "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
             ])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg("about:blank")
@@ -152,6 +152,12 @@ impl Browser {
     }
 }
 
+/// The server of a page that one has served, with its port and a slash.
+fn origin(address: &str) -> Option<String> {
+    let rest = address.strip_prefix("http://")?;
+    Some(format!("http://{}/", rest.split('/').next()?))
+}
+
 /// A key.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Key {
@@ -159,6 +165,8 @@ pub(crate) enum Key {
     Home,
     Space,
     Enter,
+    Tab,
+    Escape,
 }
 
 /// An open page.
@@ -247,6 +255,8 @@ impl Tab<'_> {
             Key::Home => ("Home", "Home", "", 36),
             Key::Space => (" ", "Space", " ", 32),
             Key::Enter => ("Enter", "Enter", "\r", 13),
+            Key::Tab => ("Tab", "Tab", "", 9),
+            Key::Escape => ("Escape", "Escape", "", 27),
         };
         for kind in ["keyDown", "keyUp"] {
             let mut event = json!({
@@ -265,6 +275,12 @@ impl Tab<'_> {
         let selector = json!(selector);
         self.run(&format!("document.querySelector({selector}).focus()"));
         self.press(key);
+    }
+
+    /// Asks for dark colours, as a reader's system settings may.
+    pub(crate) fn dark(&mut self) {
+        let feature = json!({ "name": "prefers-color-scheme", "value": "dark" });
+        self.call("Emulation.setEmulatedMedia", &json!({ "features": [feature] }));
     }
 
     /// Asks for less motion, as a reader's system settings may.
@@ -308,7 +324,8 @@ impl Tab<'_> {
                 "Log.entryAdded" => Some(format!("in the log: {parameters}")),
                 "Network.requestWillBeSent" => {
                     let url = parameters["request"]["url"].as_str().unwrap_or("");
-                    let own = url.starts_with("data:") || url == address;
+                    let site = origin(address).filter(|site| url.starts_with(site.as_str()));
+                    let own = url.starts_with("data:") || url == address || site.is_some();
                     (!own).then(|| format!("fetched {url}"))
                 }
                 _ => None,
