@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use updraft::analysis::result::Analysis;
+use updraft::archive::{series, slim};
 use updraft::base::crc::ap_crc32;
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::parse;
@@ -59,6 +60,7 @@ pub(crate) type Target = (&'static str, fn(&[u8]));
 /// All of them.
 pub(crate) const TARGETS: &[Target] = &[
     ("air", air),
+    ("archive", archive),
     ("conversation", conversation),
     ("csv", csv),
     ("fleet_table", fleet_table),
@@ -82,6 +84,35 @@ pub(crate) const TARGETS: &[Target] = &[
 pub(crate) fn run(name: &str, bytes: &[u8]) {
     for (_, target) in TARGETS.iter().filter(|(known, _)| *known == name) {
         target(bytes);
+    }
+}
+
+/// `analysis.json` as an archive reads it: twice, without keeping the whole. What the short way refuses the long way may
+/// still walk through, and an error of the taker ends the walk.
+fn archive(bytes: &[u8]) {
+    let slim = parse::json_from(bytes, std::marker::PhantomData::<slim::Analysis>);
+    let spans: Vec<slim::Span> = slim
+        .iter()
+        .flat_map(|slim| &slim.flights)
+        .map(|flight| flight.map.as_ref().map(|map| map.time_s).unwrap_or_default())
+        .collect();
+    let mut drones = 0;
+    let walked = series::walk(bytes, &spans, &mut |_, time_s, series| {
+        drones += 1;
+        assert!(time_s.len() <= bytes.len());
+        assert!(series.updraft_mps.at(bytes.len()).is_none());
+        Ok(())
+    });
+    // Whatever the program itself reads is walked through, every drone of it.
+    if let Ok(whole) = parse::json::<Analysis>(bytes) {
+        assert!(slim.is_ok(), "{:?}", slim.err());
+        assert_eq!(walked, Ok(()));
+        let maps = whole.flights.iter().filter_map(|flight| flight.map.as_ref());
+        assert!(drones >= maps.map(|map| map.drones.len()).sum::<usize>());
+    }
+    if drones > 0 {
+        let stop = || Err("enough".to_owned());
+        assert!(series::walk(bytes, &spans, &mut |_, _, _| stop()).is_err());
     }
 }
 
