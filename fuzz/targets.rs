@@ -91,7 +91,9 @@ pub(crate) fn run(name: &str, bytes: &[u8]) {
 /// still walk through, and an error of the taker ends the walk.
 fn archive(bytes: &[u8]) {
     let slim = parse::json_from(bytes, std::marker::PhantomData::<slim::Analysis>);
-    let spans: Vec<slim::Span> = slim.iter().flat_map(|slim| &slim.flights)
+    let spans: Vec<slim::Span> = slim
+        .iter()
+        .flat_map(|slim| &slim.flights)
         .map(|flight| flight.map.as_ref().map(|map| map.time_s).unwrap_or_default())
         .collect();
     let mut drones = 0;

@@ -13,8 +13,8 @@ use super::wind::Leaning;
 use super::wind_forms::WindForms;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
-use crate::flight::{Flight, Indicator};
 use crate::flight::table::Mapping;
+use crate::flight::{Flight, Indicator};
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.

@@ -57,6 +57,9 @@ pub struct Part {
     pub date: String,
     /// Rows.
     pub rows: u64,
+    /// Size of its file, bytes; 0: not known.
+    #[serde(default)]
+    pub bytes: u64,
 }
 
 /// Date of flights whose date is not known, as Hive writes a partition without a value: readers show a null.
@@ -199,7 +202,7 @@ mod tests {
             ("x", "flights", "../.."),
             ("", "flights", "2026-06-01"),
         ] {
-            let part = Part { table: table.to_owned(), date: date.to_owned(), rows: 1 };
+            let part = Part { table: table.to_owned(), date: date.to_owned(), rows: 1, bytes: 0 };
             let campaign = ArchivedCampaign {
                 id: id.to_owned(),
                 folder: "x".into(),

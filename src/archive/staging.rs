@@ -62,7 +62,8 @@ impl Staging {
             .finish()
             .map_err(|error| ArchiveError::Table { table, reason: error.to_string() })?;
         file.sync_all().map_err(|error| FileError::new("write", &path, error))?;
-        let part = Part { table: table.to_owned(), date: date.to_owned(), rows };
+        let bytes = file.metadata().map_err(|error| FileError::new("read", &path, error))?.len();
+        let part = Part { table: table.to_owned(), date: date.to_owned(), rows, bytes };
         self.made.push((part, path));
         Ok(())
     }

@@ -68,25 +68,54 @@ pub fn join(folder: &Path, record: &ItemsRecord) -> Result<(), CampaignError> {
     if !path.exists() && write_new(&path, &bytes(record, &path)?)? {
         return Ok(());
     }
-    let there: ItemsRecord = read_json(&path)?;
+    check(folder, record)
+}
+
+/// Checks that items with these settings may be looked for in a folder, and writes nothing there. A folder without a
+/// record has none of others.
+///
+/// # Errors
+///
+/// As [`join`].
+pub fn check(folder: &Path, record: &ItemsRecord) -> Result<(), CampaignError> {
+    let Some(there) = there(folder)? else { return Ok(()) };
     match record.difference(&there) {
         Some(why) => Err(CampaignError::OtherItems { path: folder.to_owned(), why }),
         None => Ok(()),
     }
 }
 
-/// Takes a folder for items with these settings, whatever was there: for items that each know their own
+/// Takes a folder for items with these settings, although there are some of others: for items that each know their own
 /// settings, so that none is taken for another's.
 ///
 /// # Errors
 ///
-/// If the record cannot be written.
+/// [`CampaignError::OtherItems`] if there are items of another kind, otherwise a file that cannot be read or
+/// written.
 pub fn take_over(folder: &Path, record: &ItemsRecord) -> Result<(), CampaignError> {
-    if join(folder, record).is_ok() {
-        return Ok(());
+    if let Some(there) = there(folder)?
+        && (there.schema != record.schema || there.items != record.items)
+    {
+        return check(folder, record);
     }
     let path = items_path(folder);
+    if check(folder, record).is_ok() && path.exists() {
+        return Ok(());
+    }
     Ok(write_whole(&path, &bytes(record, &path)?)?)
+}
+
+/// Record of a folder; `None`: it has none.
+fn there(folder: &Path) -> Result<Option<ItemsRecord>, CampaignError> {
+    let path = items_path(folder);
+    if !path.exists() {
+        return Ok(None);
+    }
+    read_json(&path).map(Some).map_err(|error: CampaignError| {
+        error.with_remedy(
+            "remove that file if all results there are of this command; each of them is checked",
+        )
+    })
 }
 
 fn bytes(record: &ItemsRecord, path: &Path) -> Result<Vec<u8>, FileError> {
@@ -120,6 +149,24 @@ mod tests {
         assert!(text.contains("updraft 0.1.0, this is updraft 0.2.0"), "{text}");
         take_over(&place, &record("8", "0.1.0")).unwrap();
         join(&place, &record("8", "0.1.0")).unwrap();
+    }
+
+    #[test]
+    fn looking_changes_nothing_and_items_of_another_kind_are_never_taken_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("blind");
+        check(&place, &record("7", "0.1.0")).unwrap();
+        assert!(!place.exists());
+        join(&place, &record("7", "0.1.0")).unwrap();
+        assert!(check(&place, &record("8", "0.1.0")).is_err());
+        join(&place, &record("7", "0.1.0")).unwrap();
+        let cells = ItemsRecord { items: "cells of a study".to_owned(), ..record("7", "0.1.0") };
+        let refused = take_over(&place, &cells).unwrap_err().to_string();
+        assert!(refused.contains("(blind flights, not cells of a study)"), "{refused}");
+        join(&place, &record("7", "0.1.0")).unwrap();
+        std::fs::write(items_path(&place), "").unwrap();
+        let broken = join(&place, &record("7", "0.1.0")).unwrap_err().to_string();
+        assert!(broken.contains("remove that file if all results there"), "{broken}");
     }
 
     #[test]

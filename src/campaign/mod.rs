@@ -177,7 +177,7 @@ pub enum CampaignError {
     },
     /// The folder has items (flights, cells) of other settings or another version.
     #[error(
-        "{} has items of other settings ({why}); choose another folder with -o, or remove this one",
+        "{} has items of other settings ({why}); choose another folder with -o",
         path.shown()
     )]
     OtherItems {

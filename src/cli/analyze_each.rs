@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::analyze::AnalyzeArgs;
@@ -11,24 +12,29 @@ use super::shard_args;
 use super::words;
 use crate::base::plain::Shown as _;
 use crate::report;
-use crate::workflow::analyze::each::{EachDone, each, ending};
+use crate::workflow::analyze::each::{EachDone, each, ending, ending_of_shard};
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::share::ShardDone;
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct EachOutput {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct EachOutput {
+    /// Format name and version: `updraft.analyze-each/1`.
     schema: &'static str,
+    /// Campaigns, in the order in which they were given.
     campaigns: Vec<OneOutput>,
 }
 
-#[derive(Serialize)]
+/// One campaign.
+#[derive(Serialize, JsonSchema)]
 struct OneOutput {
+    /// Path as it was given.
     path: PathBuf,
-    /// Page of the report; `None`: the analysis failed or found nothing.
+    /// Page of the report; null: the analysis failed or found nothing.
     report: Option<PathBuf>,
-    /// Logs, and those that gave a drone's results.
+    /// Number of logs.
     logs: usize,
+    /// Number of logs that gave a drone's results.
     used: usize,
     /// Losses, one sentence each; for a failed analysis, the reason.
     problems: Vec<String>,
@@ -84,7 +90,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
             &ShardDone { shard, items: all.len(), there, lost },
             "analysis",
         )?;
-        return Ok(exit);
+        return Ok(ending_of_shard(&all).into());
     }
     let campaigns: Vec<OneOutput> = all.iter().map(OneOutput::of).collect();
     for one in &campaigns {

@@ -76,6 +76,11 @@ impl LiveArgs {
         let source = Arc::clone(&station);
         let source: Arc<dyn Source> = source;
         let served = serve(context, &folder.0, &source, &wish)?;
-        Ok(Live { station: Some(station), orders: self.live_orders, _air: air, _served: Some(served) })
+        Ok(Live {
+            station: Some(station),
+            orders: self.live_orders,
+            _air: air,
+            _served: Some(served),
+        })
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn run(
     let watch = Stopwatch::start(context);
     let Asked { output, settings, share, .. } = asked;
     let work = SensitivityWork::open(study, output, settings.seed, asked.force, *share)?;
-    join(context, output, &work, *share)?;
+    join(context, output, (study, settings.seed), &work, *share)?;
     let takes = |item: usize| share.takes(item);
     let total = share.count(work.total());
     let kept = total - work.open_items(&takes);

@@ -1,6 +1,7 @@
 //! Options of commands whose items can be shared out between processes.
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -42,18 +43,19 @@ impl ShardArgs {
 }
 
 /// What `--json` prints of a shard.
-#[derive(Serialize)]
-struct ShardOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct ShardOutput<'a> {
+    /// Format name and version: `updraft.shard/1`.
     schema: &'static str,
-    /// `K/N`.
+    /// Shard, as `K/N`.
     shard: String,
     /// Number of its items.
     items: usize,
-    /// Those that were finished before.
+    /// Number of those that were finished before.
     there: usize,
-    /// Those that this process made.
+    /// Number of those that this process made.
     made: usize,
-    /// Why others could not be made.
+    /// Reasons why others could not be made.
     lost: &'a [String],
 }
 

@@ -15,9 +15,12 @@ use crate::study::result::StudyResult;
 use crate::study::sensitivity::items_folder;
 use crate::study::{AnyStudy, Cell, Settings, StudyPlan, Work, cells_folder};
 use crate::workflow::clock::Stopwatch;
-use crate::workflow::cluster::Results;
-use crate::workflow::sensitivity::Settings as CampaignSettings;
-use crate::workflow::study::{BUILT_IN, evaluated, fly, join, refuse_campaign, shard_done, write};
+use crate::workflow::cluster::{Items, Results};
+use crate::workflow::sensitivity::{self as campaigns, Settings as CampaignSettings};
+use crate::workflow::share::needs_folder;
+use crate::workflow::study::{
+    BUILT_IN, RESULT_FILE, evaluated, fly, join, record, refuse_campaign, shard_done, write,
+};
 
 /// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
@@ -76,26 +79,37 @@ struct SweepOutput<'a> {
 }
 
 impl SweepArgs {
-    /// Folder of the study, the files of its items, and whether these are made in a folder that can be chosen
-    /// and was not.
-    pub(super) fn results(&self, cwd: &Path) -> Result<(PathBuf, Results, bool), CommandError> {
+    /// Items of the study, as a cluster makes them.
+    pub(super) fn items(&self, cwd: &Path) -> Result<Items, CommandError> {
         let folder = self.output.clone();
-        let results = match AnyStudy::load(&self.study)? {
+        Ok(match AnyStudy::load(&self.study)? {
             AnyStudy::Ladder(study) => {
                 let cells = cwd.join(cells_folder(&folder));
                 let file = |cell: &Cell| cells.join(format!("{}.json", cell.name()));
-                Results::Named { files: study.cells().iter().map(file).collect() }
+                Items {
+                    name: "flight",
+                    results: Results::Named { files: study.cells().iter().map(file).collect() },
+                    product: Some(folder.join(RESULT_FILE)),
+                    record: Some(record(&study, self.seed, command(self))?),
+                    has_scratch: false,
+                    folder,
+                }
             }
-            AnyStudy::Sensitivity(study) => Results::Numbered {
-                folder: cwd.join(items_folder(&folder)),
-                digits: 6,
-                suffix: ".json".to_owned(),
-                count: study.drawn(self.seed).len(),
-                per_folder: Some(1000),
+            AnyStudy::Sensitivity(study) => Items {
+                name: "campaign",
+                results: Results::Numbered {
+                    folder: cwd.join(items_folder(&folder)),
+                    digits: 6,
+                    suffix: ".json".to_owned(),
+                    count: study.drawn(self.seed).len(),
+                    per_folder: Some(1000),
+                },
+                product: Some(folder.join(campaigns::RESULT_FILE)),
+                record: Some(campaigns::record(&study, self.seed, command(self))?),
+                has_scratch: self.scratch.is_none(),
+                folder,
             },
-        };
-        let has_scratch = matches!(results, Results::Numbered { .. }) && self.scratch.is_none();
-        Ok((folder, results, has_scratch))
+        })
     }
 }
 
@@ -103,6 +117,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     let study = AnyStudy::load(&args.study)?;
     refuse_campaign(&args.output)?;
     let share = args.sharing.share();
+    needs_folder(&args.output, share)?;
     // Shards share the folder, on file systems that may have no locks.
     let _lock = share.shard.is_none().then(|| context.lock(&args.output)).transpose()?;
     match study {

@@ -4,8 +4,11 @@ use clap::{Args, ValueEnum};
 use clap_complete::Shell;
 use schemars::schema_for;
 
+use super::analyze_each::EachOutput;
+use super::cluster::output::{CancelOutput, ScriptOutput, SubmitOutput};
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::shard_args::ShardOutput;
 use crate::analysis::result::Analysis;
 use crate::archive::index::ArchiveIndex;
 use crate::blind::game::GameFile;
@@ -106,8 +109,18 @@ pub enum Format {
     AnalysisRecord,
     /// cluster/job.json of `updraft cluster submit`
     Cluster,
+    /// what `updraft cluster script --json` prints
+    ClusterScript,
+    /// what `updraft cluster submit --json` prints
+    ClusterSubmit,
     /// what `updraft cluster status --json` prints
     ClusterStatus,
+    /// what `updraft cluster cancel --json` prints
+    ClusterCancel,
+    /// what a command with --shard and --json prints
+    Shard,
+    /// what `updraft analyze --each --json` prints
+    AnalyzeEach,
     /// what `updraft archive --json` prints
     Archive,
     /// archive.json of an archive
@@ -145,7 +158,12 @@ impl Format {
             Self::Items => schema_for!(ItemsRecord),
             Self::AnalysisRecord => schema_for!(AnalysisRecord),
             Self::Cluster => schema_for!(ClusterRecord),
+            Self::ClusterScript => schema_for!(ScriptOutput),
+            Self::ClusterSubmit => schema_for!(SubmitOutput),
             Self::ClusterStatus => schema_for!(Status),
+            Self::ClusterCancel => schema_for!(CancelOutput),
+            Self::Shard => schema_for!(ShardOutput<'_>),
+            Self::AnalyzeEach => schema_for!(EachOutput),
             Self::Archive => schema_for!(ArchiveOutput),
             Self::ArchiveIndex => schema_for!(ArchiveIndex),
         };

@@ -237,7 +237,8 @@ pub fn give(
         Err(error) => return Err(FileError::new("use the folder", &folder, error)),
     }
     let Some(file) = get::<StationFile>(&folder.join(STATION_FILE)) else { return Ok(None) };
-    let order = Order { schema: ORDER_SCHEMA.to_owned(), station: file.station, action, drones, from };
+    let order =
+        Order { schema: ORDER_SCHEMA.to_owned(), station: file.station, action, drones, from };
     let given = Given {
         order: folder.join(format!("{name}{ORDER_END}")),
         answer: folder.join(format!("{name}{ANSWER_END}")),
@@ -274,7 +275,9 @@ mod tests {
     fn an_order_is_taken_once_and_answered() {
         let flight = tempfile::tempdir().unwrap();
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
-        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE]), From::Terminal).unwrap().unwrap();
+        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE]), From::Terminal)
+            .unwrap()
+            .unwrap();
         let taken = inbox.take();
         assert_eq!(taken[0].order.drones, Some(vec![DRONE]));
         assert_eq!(taken[0].order.action, Action::Land);
@@ -294,7 +297,8 @@ mod tests {
         let flight = tempfile::tempdir().unwrap();
         // A station that is killed leaves its file.
         std::mem::forget(Inbox::open(flight.path(), "one".to_owned()).unwrap());
-        let given = give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().unwrap();
+        let given =
+            give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().unwrap();
         let order = fs::read(&given.order).unwrap();
         let mut later = Inbox::open(flight.path(), "two".to_owned()).unwrap();
         assert!(later.take().is_empty(), "removed when the station begins");

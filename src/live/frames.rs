@@ -107,10 +107,9 @@ mod tests {
     use super::*;
 
     fn view(places: &[f64], said: u64) -> View {
-        let drones = places.iter().map(|x| DroneView {
-            place_m: Some([*x, 0.0, 0.0]),
-            ..DroneView::default()
-        });
+        let drones = places
+            .iter()
+            .map(|x| DroneView { place_m: Some([*x, 0.0, 0.0]), ..DroneView::default() });
         let said = (1..=said).map(|number| Said {
             number,
             at_ms: 0,

@@ -328,10 +328,13 @@ impl Source for Station {
         now.look_at_charge(at);
         let flying: BTreeMap<DroneId, Flying> = now.monitor.flying().collect();
         let slots: BTreeMap<DroneId, u16> = now.monitor.slots().collect();
-        let taken: BTreeMap<u16, DroneId> = slots.iter().map(|(drone, slot)| (*slot, *drone)).collect();
-        let of_slots = self.plan.slots.iter().map(|slot| (Some(slot.slot), taken.get(&slot.slot).copied()));
+        let taken: BTreeMap<u16, DroneId> =
+            slots.iter().map(|(drone, slot)| (*slot, *drone)).collect();
+        let of_slots =
+            self.plan.slots.iter().map(|slot| (Some(slot.slot), taken.get(&slot.slot).copied()));
         let heard = now.monitor.telemetry.drones.keys();
-        let others = heard.filter(|drone| !slots.contains_key(drone)).map(|drone| (None, Some(*drone)));
+        let others =
+            heard.filter(|drone| !slots.contains_key(drone)).map(|drone| (None, Some(*drone)));
         let rows: Vec<(Option<u16>, Option<DroneId>)> = of_slots.chain(others).collect();
         let drones = rows.into_iter().map(|(slot, drone)| {
             let state = drone.and_then(|drone| now.monitor.telemetry.get(drone));

@@ -106,8 +106,12 @@ impl Thin {
                 if pulses.len() == self.motors {
                     let mean = pulses.iter().sum::<f64>() / pulses.len() as f64;
                     channels.pulse.push(time_s, mean);
-                    channels.pulse_max.push(time_s, pulses.iter().copied().fold(f64::MIN, f64::max));
-                    channels.pulse_min.push(time_s, pulses.iter().copied().fold(f64::MAX, f64::min));
+                    channels
+                        .pulse_max
+                        .push(time_s, pulses.iter().copied().fold(f64::MIN, f64::max));
+                    channels
+                        .pulse_min
+                        .push(time_s, pulses.iter().copied().fold(f64::MAX, f64::min));
                 }
             }
             _ => {}

@@ -96,6 +96,9 @@ pub(super) fn spread(outcome: &OutcomeResult) -> String {
         return format!("{} have it", count(outcome.n, "campaign"));
     };
     let unit = if outcome.unit.is_empty() { String::new() } else { format!(" {}", outcome.unit) };
+    if sd == 0.0 {
+        return format!("{mean}{unit} in every campaign: no factor decides anything");
+    }
     let number = |value: f64| fixed(value, decimals(sd));
     let range = match &outcome.quantiles[..] {
         [_, low, _, median, _, high, _] => format!(

@@ -26,4 +26,4 @@ pub use evaluate::evaluate;
 pub use fly::{CELL_SCHEMA, CellLog, CellRecord};
 pub use kind::AnyStudy;
 pub use template::{STUDY_TEMPLATE_SCHEMA, StudyPlan};
-pub use work::{Flown, Lost, Settings, Work, cells_folder, logs_folder};
+pub use work::{Flown, Lost, Settings, Work, cells_folder, logs_folder, study_sha256};

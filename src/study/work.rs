@@ -128,16 +128,14 @@ impl<'a> Work<'a> {
         self.cells.iter().filter(|item| item.record.is_none()).count()
     }
 
-    /// SHA-256 of what all flights of the study have in common, hexadecimal.
-    ///
-    /// # Errors
-    /// [`StudyError::Record`] if the settings have no form as JSON.
-    pub fn sha256(&self) -> Result<String, StudyError> {
-        // The key of a cell has all of it, and its air beside.
-        let reference = Cell { condition: Condition::STILL, updraft_mps: 0.0 };
-        reference
-            .key(self.study, self.settings.seed)
-            .map_err(|source| StudyError::Record { cell: reference.name(), source })
+    /// Study that is flown.
+    pub fn study(&self) -> &'a StudyPlan {
+        self.study
+    }
+
+    /// Seed of the study.
+    pub fn seed(&self) -> u64 {
+        self.settings.seed
     }
 
     /// Names of the flights that are not finished.
@@ -190,6 +188,18 @@ impl<'a> Work<'a> {
         }
         Ok(all)
     }
+}
+
+/// SHA-256 of what all flights of a study have in common, hexadecimal.
+///
+/// # Errors
+/// [`StudyError::Record`] if the settings have no form as JSON.
+pub fn study_sha256(study: &StudyPlan, seed: u64) -> Result<String, StudyError> {
+    // The key of a cell has all of it, and its air beside.
+    let reference = Cell { condition: Condition::STILL, updraft_mps: 0.0 };
+    reference
+        .key(study, seed)
+        .map_err(|source| StudyError::Record { cell: reference.name(), source })
 }
 
 fn record_path(folder: &Path, cell: &Cell) -> PathBuf {

@@ -7,7 +7,7 @@ use super::error::{WorkflowError, with_reasons};
 use super::gap::search::Searched;
 use super::host::Host;
 use super::made_by;
-use super::share::{ShardDone, numbers, on_threads};
+use super::share::{self, ShardDone, numbers, on_threads};
 use crate::base::file::write_whole;
 use crate::base::shard::Share;
 use crate::blind::render::{Style, render};
@@ -16,7 +16,7 @@ use crate::blind::series::{self, Place, Settings, Taken};
 use crate::blind::table::{Table, table};
 use crate::blind::tables::{FIRST_OF_PAIRS, FOREIGN_KINDS, KINDS, TOGETHER};
 use crate::blind::{Base, BlindError, Worlds};
-use crate::campaign::items::{self, ItemsRecord};
+use crate::campaign::items::ItemsRecord;
 use crate::campaign::to_json;
 
 /// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
@@ -69,6 +69,17 @@ pub enum Ran {
     Shard(ShardDone),
 }
 
+/// Record of a series' flights; `command`: for people.
+///
+/// # Errors
+/// If the settings have no form as JSON.
+pub fn record(settings: &Settings, command: String) -> Result<ItemsRecord, WorkflowError> {
+    Ok(ItemsRecord::new(made_by(), "blind flights", settings.flight_sha256()?, command))
+}
+
+/// File of the table's numbers, in a series' folder.
+pub const RESULT_FILE: &str = "table.json";
+
 /// Flies a series, `jobs` flights at the same time (`None`: one per core), and writes its table; of a
 /// shard, only its flights. `note` goes into the table's head. Finished flights are kept.
 ///
@@ -85,11 +96,10 @@ pub fn run(
 ) -> Result<Ran, WorkflowError> {
     settings.check_seed()?;
     settings.cells()?;
+    share::needs_folder(&place.folder, share)?;
     // Shards share the folder, on file systems that may have no locks.
     let _lock = share.shard.is_none().then(|| host.lock(&place.folder)).transpose()?;
-    let record =
-        ItemsRecord::new(made_by(), "blind flights", settings.flight_sha256()?, host.command());
-    items::join(&place.folder, &record)?;
+    share::join(&place.folder, &record(settings, host.command())?, share, false)?;
     let count = share.count(settings.flights);
     let progress = host.progress("blind flights", count as u64);
     let work = || {
@@ -123,7 +133,7 @@ pub fn run(
     let json = to_json(&table)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
     let markdown = place.folder.join("table.md");
-    write_whole(&place.folder.join("table.json"), &json)?;
+    write_whole(&place.folder.join(RESULT_FILE), &json)?;
     write_whole(&markdown, render(&table, Style::Markdown, note).as_bytes())?;
     let flights = sorted.outcomes.len();
     Ok(Ran::Table(Box::new(Scored { table, markdown, flights, lost: sorted.lost })))

@@ -86,8 +86,8 @@ pub enum WorkflowError {
     Nothing(String),
     /// Items that others should have made are not there, and nothing was to be made.
     #[error(
-        "{count} of {of} {what} missing: {missing}\nrun the same command without --no-fly to make them, or with \
-         --shard to share them out"
+        "{count} of {of} {what} missing: {missing}\nrun the same command without --no-fly to make them; several \
+         processes can share the work (--shard K/N)"
     )]
     Missing {
         /// Kind of the items, a plural: "blind flights".

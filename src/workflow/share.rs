@@ -1,8 +1,12 @@
 //! Work that is shared out between processes: what a shard has done, and which items are missing.
 
+use std::path::Path;
+
 use super::ending::Ending;
 use super::error::WorkflowError;
-use crate::base::shard::Shard;
+use crate::base::file::FileError;
+use crate::base::shard::{Shard, Share};
+use crate::campaign::items::{self, ItemsRecord};
 
 /// Outcome of a shard's work.
 #[derive(Clone, Debug)]
@@ -27,6 +31,37 @@ impl ShardDone {
     pub fn made(&self) -> usize {
         self.items - self.there - self.lost.len()
     }
+}
+
+/// Refuses to gather from a folder that is not there, and does not make it.
+///
+/// # Errors
+/// If results are only to be put together, and their folder does not exist.
+pub fn needs_folder(folder: &Path, share: Share) -> Result<(), WorkflowError> {
+    if share.gather_only && !folder.is_dir() {
+        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
+        return Err(FileError::new("gather results from", folder, missing).into());
+    }
+    Ok(())
+}
+
+/// Takes a folder for items, joins those who have taken it, or, where results are only to be put together, looks. Without
+/// a shard `takes_over` says whether items of other settings give way.
+///
+/// # Errors
+/// If the folder has items of other settings, another version or another kind.
+pub fn join(
+    folder: &Path,
+    record: &ItemsRecord,
+    share: Share,
+    takes_over: bool,
+) -> Result<(), WorkflowError> {
+    match share {
+        Share { gather_only: true, .. } => items::check(folder, record)?,
+        Share { shard: None, .. } if takes_over => items::take_over(folder, record)?,
+        _ => items::join(folder, record)?,
+    }
+    Ok(())
 }
 
 /// Runs `work` on so many threads; `None`: on those of the program.

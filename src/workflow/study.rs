@@ -6,18 +6,21 @@ use super::clock::Stopwatch;
 use super::error::WorkflowError;
 use super::host::Host;
 use super::made_by;
-use super::share::{ShardDone, on_threads};
+use super::share::{self, ShardDone, on_threads};
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
 use crate::base::shard::{Shard, Share};
-use crate::campaign::items::{self, ItemsRecord};
+use crate::campaign::items::ItemsRecord;
 use crate::campaign::{self, to_json};
 use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
-use crate::study::{Flown, Settings, StudyPlan, Work, evaluate};
+use crate::study::{Flown, Settings, StudyPlan, Work, evaluate, study_sha256};
 
 /// Name of the built-in study.
 pub const BUILT_IN: &str = "study";
+
+/// File of the numbers, in a study's folder.
+pub const RESULT_FILE: &str = "study.json";
 
 /// Flies the open cells of a study, `jobs` flights at the same time.
 ///
@@ -51,17 +54,21 @@ pub fn join(
     work: &Work<'_>,
     share: Share,
 ) -> Result<(), WorkflowError> {
-    let record = ItemsRecord::new(made_by(), "cells of a study", work.sha256()?, host.command());
-    match share.shard {
-        Some(_) => items::join(folder, &record)?,
-        None => items::take_over(folder, &record)?,
-    }
+    share::join(folder, &record(work.study(), work.seed(), host.command())?, share, true)?;
     let missing = if share.gather_only { work.missing() } else { Vec::new() };
     if missing.is_empty() {
         return Ok(());
     }
     let (count, missing) = (missing.len(), missing.join(", "));
     Err(WorkflowError::Missing { what: "cells of the study", count, of: work.total(), missing })
+}
+
+/// Record of a study's flights; `command`: for people.
+///
+/// # Errors
+/// If the settings have no form as JSON.
+pub fn record(study: &StudyPlan, seed: u64, command: String) -> Result<ItemsRecord, WorkflowError> {
+    Ok(ItemsRecord::new(made_by(), "cells of a study", study_sha256(study, seed)?, command))
 }
 
 /// Outcome of a shard of a study.
@@ -139,7 +146,7 @@ pub fn write(
         Provenance { program: made_by(), command, seed: Some(seed), ..Provenance::default() };
     let made = report::render_study(result, &provenance)?;
     let pages = folder.join("report");
-    write_whole(&folder.join("study.json"), &json)?;
+    write_whole(&folder.join(RESULT_FILE), &json)?;
     report::write(&made, &pages)?;
     Ok(pages.join(report::PAGE_FILE))
 }

@@ -2,9 +2,13 @@
 
 use crate::base::time::GpsTime;
 
-/// `1 log`, `2 logs`.
+/// `1 log`, `2 logs`, `3 analyses`.
 pub(crate) fn count(number: usize, noun: &str) -> String {
-    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+    match noun.strip_suffix("sis") {
+        _ if number == 1 => format!("1 {noun}"),
+        Some(stem) => format!("{number} {stem}ses"),
+        None => format!("{number} {noun}s"),
+    }
 }
 
 /// A word of a shell's command line.

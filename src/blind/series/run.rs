@@ -1,5 +1,6 @@
 //! Flights of a table, one after the other or many at once: sealed, flown, explained, opened, scored.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use crate::blind::explain::Explain;
 use crate::blind::fly::fly;
 use crate::blind::score::{Outcome, score};
 use crate::blind::seal;
-use crate::campaign::read_json;
+use crate::campaign::{CampaignError, read_json};
 
 /// Name and version of the format of one finished flight.
 pub const RESULT_SCHEMA: &str = "updraft.blind-flight/1";
@@ -68,6 +69,8 @@ pub fn run(
         .map(|(index, draw)| finished(place, *index, draw, made_by))
         .collect::<Result<_, _>>()?;
     place.sweep();
+    // A disk that is full fills for no flight after it.
+    let is_unwritable = AtomicBool::new(false);
     let taken: Vec<_> = draws
         .par_iter()
         .zip(finished)
@@ -76,15 +79,30 @@ pub fn run(
             let result = match finished {
                 Some(result) => Ok(result),
                 None if share.gather_only => Err(BlindError::NotFlown { index: *index }),
-                None if stop.load(Ordering::Relaxed) => Err(BlindError::Stopped),
+                None if stop.load(Ordering::Relaxed) || is_unwritable.load(Ordering::Relaxed) => {
+                    Err(BlindError::Stopped)
+                }
                 None => one(draw, *index, place, made_by, explain, stop),
             };
+            if matches!(
+                &result,
+                Err(BlindError::File(_) | BlindError::Campaign(CampaignError::File(_)))
+            ) {
+                is_unwritable.store(true, Ordering::Relaxed);
+            }
             done();
             Taken { index: *index, result, was_there }
         })
         .collect();
     if stop.load(Ordering::Relaxed) {
         return Err(BlindError::Stopped);
+    }
+    if is_unwritable.load(Ordering::Relaxed) {
+        let is_file = |error: &BlindError| {
+            matches!(error, BlindError::File(_) | BlindError::Campaign(CampaignError::File(_)))
+        };
+        let first = taken.into_iter().filter_map(|taken| taken.result.err()).find(is_file);
+        return Err(first.unwrap_or(BlindError::Stopped));
     }
     Ok(taken)
 }
@@ -100,6 +118,22 @@ pub struct Taken {
     pub was_there: bool,
 }
 
+/// What every version's result says of itself.
+#[derive(Deserialize)]
+struct Head {
+    schema: String,
+    made_by: String,
+}
+
+/// Content of a result; `None` if it is damaged.
+fn there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, BlindError> {
+    match read_json(path) {
+        Ok(value) => Ok(Some(value)),
+        Err(CampaignError::Json { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
 /// A flight that was finished before, if it is of this table and this version.
 fn finished(
     place: &Place,
@@ -111,15 +145,15 @@ fn finished(
     if !path.exists() {
         return Ok(None);
     }
-    let result: FlightResult = read_json(&path)?;
-    if result.schema != RESULT_SCHEMA {
-        let found = result.schema;
-        return Err(BlindError::Schema { path, found, wanted: RESULT_SCHEMA });
+    // What is no result, a file cut short for example, is missing.
+    let Some(Head { schema, made_by: found }) = there(&path)? else { return Ok(None) };
+    if schema != RESULT_SCHEMA {
+        return Err(BlindError::Schema { path, found: schema, wanted: RESULT_SCHEMA });
     }
-    if result.made_by != made_by {
-        let (found, wanted) = (result.made_by, made_by.to_owned());
-        return Err(BlindError::Version { path, found, wanted });
+    if found != made_by {
+        return Err(BlindError::Version { path, found, wanted: made_by.to_owned() });
     }
+    let Some(result) = there::<FlightResult>(&path)? else { return Ok(None) };
     let outcome = &result.outcome;
     if outcome.seed != draw.seed || outcome.cell != *draw.cell {
         let why = format!(

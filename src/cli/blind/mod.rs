@@ -5,7 +5,7 @@ mod hide;
 mod reveal;
 mod verify;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 
@@ -19,7 +19,8 @@ use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::shard_args::{self, ShardArgs};
 use crate::cli::words;
-use crate::workflow::blind::{self, Ran};
+use crate::workflow::blind::{self, RESULT_FILE, Ran, record};
+use crate::workflow::cluster::{Items, Results};
 
 /// The word for nothing.
 const NONE: &str = "none";
@@ -96,7 +97,7 @@ pub(super) struct SeriesArgs {
     /// Known vehicles, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "airsim,inflow,pixel")]
     base: Vec<BaseWord>,
-    /// Drones along each side of the grid: fewer take less time and show less
+    /// Drones along each side of the grid, 3 to 15: fewer take less time and show less
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(3..=15))]
     grid: u16,
     /// Accept a seed reserved for tuning; the table says so
@@ -202,17 +203,25 @@ fn foreign_kinds_text() -> String {
 }
 
 impl SeriesArgs {
-    /// The folder of the table, and its number of flights, after a look at the arguments.
-    pub(super) fn results(&self) -> Result<(PathBuf, usize), CommandError> {
+    /// Flights of the table, as a cluster makes them, after a look at the arguments.
+    pub(super) fn items(&self, cwd: &Path, command: String) -> Result<Items, CommandError> {
         let settings = self.settings();
         settings.check_seed()?;
         settings.cells()?;
-        Ok((self.output.clone(), settings.flights))
-    }
-
-    /// Whether the folder to fly in was chosen.
-    pub(super) fn has_scratch(&self) -> bool {
-        self.scratch.is_some()
+        Ok(Items {
+            name: "blind flight",
+            results: Results::Numbered {
+                folder: cwd.join(&self.output).join("flights"),
+                digits: 5,
+                suffix: ".json".to_owned(),
+                count: settings.flights,
+                per_folder: None,
+            },
+            product: Some(self.output.join(RESULT_FILE)),
+            record: Some(record(&settings, command)?),
+            has_scratch: self.scratch.is_none(),
+            folder: self.output.clone(),
+        })
     }
 
     fn settings(&self) -> Settings {

@@ -13,7 +13,7 @@ use crate::cli::simulate::SimulateArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::words;
 use crate::workflow::cluster::{
-    Job, Measured, Resources, Results, choose, cluster_folder, measure, most_tasks,
+    Items, Job, Measured, Resources, Results, choose, cluster_folder, measure, most_tasks,
 };
 
 #[derive(Debug, Args)]
@@ -66,7 +66,8 @@ struct OnCluster {
     /// Account that is charged
     #[arg(long, value_name = "NAME")]
     account: Option<String>,
-    /// Another option of sbatch, for example --sbatch=--qos=long; can be repeated
+    /// Another option of sbatch, as a line of a script has it: --sbatch=--qos=long, --sbatch='--comment="two words"';
+    /// can be repeated
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     sbatch: Vec<String>,
     /// Folder for the job's script, record and output [default: cluster/ in the folder of the results; for
@@ -96,14 +97,21 @@ pub(super) fn chosen(
              many items"
         )));
     }
-    if let Some(shards) = asked.shards {
-        return Ok(Some(Chosen { job, shards, measured: None }));
-    }
-    context.say(&format!("Making one {} to see how long it takes ...", job.item));
-    let Some(measured) = measure(context, &job)? else {
+    let missing = job.items.results.finished().iter().filter(|done| done.is_none()).count();
+    if missing == 0 && job.items.results.count() > 0 {
         context.say(&format!("All results are there: run `{}` to put them together", job.line()));
         return Ok(None);
-    };
+    }
+    if let Some(asked) = asked.shards {
+        let count = u32::try_from(job.items.results.count()).unwrap_or(u32::MAX).max(1);
+        let shards = asked.min(count);
+        if shards < asked {
+            context.say(&format!("There are {count} items: {count} tasks, not {asked}"));
+        }
+        return Ok(Some(Chosen { job, shards, measured: None }));
+    }
+    context.say(&format!("Making one {} to see how long it takes ...", job.items.name));
+    let Some(measured) = measure(context, &job)? else { return Ok(None) };
     let (shards, limit_s) = choose(&measured, asked.cpus, most);
     context.say(&format!(
         "It took {:.1} s; {} missing, shared out to {} of about {:.0} min",
@@ -120,18 +128,28 @@ pub(super) fn chosen(
     Ok(Some(Chosen { job, shards, measured: Some(measured) }))
 }
 
+/// Command line as people write it.
+fn line(command: &str, given: &[String]) -> String {
+    let words = given.iter().map(|word| words::shell(word));
+    ["updraft".to_owned(), command.to_owned()]
+        .into_iter()
+        .chain(words)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
 /// A time limit in whole minutes.
 fn minutes(limit_s: u64) -> String {
     let minutes = limit_s.div_ceil(60);
     format!("{}:{:02}:00", minutes / 60, minutes % 60)
 }
 
-fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), CommandError> {
-    let (command, item, cluster) = match &args.work {
-        Work::Blind(of) => ("blind", "blind flight", &of.cluster),
-        Work::Sweep(of) => ("sweep", "flight", &of.cluster),
-        Work::Simulate(of) => ("simulate", "log", &of.cluster),
-        Work::Analyze(of) => ("analyze", "analysis", &of.cluster),
+fn job<'a>(args_of: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), CommandError> {
+    let (command, cluster) = match &args_of.work {
+        Work::Blind(of) => ("blind", &of.cluster),
+        Work::Sweep(of) => ("sweep", &of.cluster),
+        Work::Simulate(of) => ("simulate", &of.cluster),
+        Work::Analyze(of) => ("analyze", &of.cluster),
     };
     let mut given = arguments::<OnCluster>(word, command)?;
     if let Some(shard) =
@@ -146,50 +164,39 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
     })?;
     let program = std::env::current_exe()
         .map_err(|error| CommandError::Failed(format!("failed to find this program: {error}")))?;
-    let named = |files: Vec<PathBuf>| Results::Named {
-        files: files.iter().map(|file| cwd.join(file)).collect(),
+    let mut args = vec![command.to_owned()];
+    let named = |name: &'static str, folder: PathBuf, files: Vec<PathBuf>| Items {
+        name,
+        folder,
+        results: Results::Named { files: files.iter().map(|file| cwd.join(file)).collect() },
+        product: None,
+        record: None,
+        has_scratch: false,
     };
-    let mut scratch = false;
-    let (folder, results) = match &args.work {
-        Work::Blind(of) => {
-            scratch = !of.command.has_scratch();
-            let (folder, count) = of.command.results()?;
-            let flights = cwd.join(&folder).join("flights");
-            let suffix = ".json".to_owned();
-            (
-                folder,
-                Results::Numbered { folder: flights, digits: 5, suffix, count, per_folder: None },
-            )
-        }
-        Work::Sweep(of) => {
-            let (folder, results, has_scratch) = of.command.results(&cwd)?;
-            scratch = has_scratch;
-            (folder, results)
-        }
+    let items = match &args_of.work {
+        Work::Blind(of) => of.command.items(&cwd, line(command, &given))?,
+        Work::Sweep(of) => of.command.items(&cwd)?,
         Work::Simulate(of) => {
             let (folder, files) = of.command.results()?;
-            (folder, named(files))
+            named("log", folder, files)
         }
         Work::Analyze(of) => {
             if !given.iter().any(|word| word == "--each") {
                 given.push("--each".to_owned());
             }
-            (PathBuf::new(), named(of.command.results()?))
+            named("analysis", PathBuf::new(), of.command.results()?)
         }
     };
-    let default = || cluster_folder(&folder);
+    let default = || cluster_folder(&items.folder);
     let job_folder = cwd.join(cluster.job_folder.clone().unwrap_or_else(default));
-    let mut args = vec![command.to_owned()];
     args.append(&mut given);
     let job = Job {
         command,
-        item,
+        items,
         program,
         args,
         cwd,
         folder: job_folder,
-        results,
-        has_scratch: scratch,
         resources: Resources {
             cpus: cluster.cpus,
             time: cluster.time.clone(),
@@ -200,5 +207,6 @@ fn job<'a>(args: &'a JobArgs, word: &str) -> Result<(Job, &'a OnCluster), Comman
         },
     };
     job.check()?;
+    job.fits()?;
     Ok((job, cluster))
 }

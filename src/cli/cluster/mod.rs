@@ -2,17 +2,19 @@
 
 mod given;
 mod job;
+pub(in crate::cli) mod output;
 mod status;
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use serde::Serialize;
 
-use self::job::{JobArgs, chosen};
+use self::job::{Chosen, JobArgs, chosen};
+use self::output::{CancelOutput, SCRIPT_SCHEMA, SUBMIT_SCHEMA, ScriptOutput, SubmitOutput};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::workflow::cluster::{self, ClusterRecord, submit_script};
+use crate::cli::words;
+use crate::workflow::cluster::{self, submit_script};
 
 /// Arguments of `updraft cluster`.
 #[derive(Debug, Args)]
@@ -48,56 +50,62 @@ struct FolderArgs {
     folder: PathBuf,
 }
 
-/// What `submit` and `cancel` print with `--json`.
-#[derive(Serialize)]
-struct JobOutput<'a> {
-    schema: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    script: Option<PathBuf>,
-    job: &'a ClusterRecord,
-}
-
 pub(super) fn run(context: &Context, args: &ClusterArgs) -> Result<Exit, CommandError> {
     match &args.command {
         ClusterCommand::Script(args) => script(context, args),
         ClusterCommand::Submit(args) => submit(context, args),
         ClusterCommand::Status(args) => status::run(context, &args.folder),
         ClusterCommand::Cancel(args) => {
-            let job = cluster::cancel(&args.folder)?;
+            let done = cluster::cancel(context, &args.folder)?;
             if context.json {
-                let schema = "updraft.cluster-cancel/1";
-                context.print_json(&JobOutput { schema, script: None, job: &job })?;
+                context.print_json(&CancelOutput::of(&done))?;
             }
-            context.say(&format!(
-                "Cancelled array {} and merge {}; what is finished stays",
-                job.array_job, job.merge_job
-            ));
+            let (array, merge) = (&done.record.array_job, &done.record.merge_job);
+            context.say(&if done.was_queued {
+                format!("Cancelled array {array} and merge {merge}; what is finished stays")
+            } else {
+                format!("Nothing of array {array} and merge {merge} was in the queue any more")
+            });
             Ok(Exit::Done)
         }
     }
 }
 
 fn script(context: &Context, args: &JobArgs) -> Result<Exit, CommandError> {
-    let Some(chosen) = chosen(context, args, "script")? else { return Ok(Exit::Done) };
+    let chosen = chosen(context, args, "script")?;
     let made_by = concat!("updraft ", env!("CARGO_PKG_VERSION"));
-    let text = submit_script(&chosen.job, chosen.shards, chosen.measured.as_ref(), made_by)?;
-    context.emit(&text)?;
+    let script = |chosen: &Chosen| {
+        submit_script(&chosen.job, chosen.shards, chosen.measured.as_ref(), made_by)
+    };
+    let text = chosen.as_ref().map(script).transpose()?;
+    if context.json {
+        let tasks = chosen.as_ref().map_or(0, |chosen| chosen.shards);
+        context.print_json(&ScriptOutput { schema: SCRIPT_SCHEMA, script: text, tasks })?;
+    } else if let Some(text) = text {
+        context.emit(&text)?;
+    }
     Ok(Exit::Done)
 }
 
 fn submit(context: &Context, args: &JobArgs) -> Result<Exit, CommandError> {
-    let Some(chosen) = chosen(context, args, "submit")? else { return Ok(Exit::Done) };
+    let Some(chosen) = chosen(context, args, "submit")? else {
+        if context.json {
+            let (script, job) = (None, None);
+            context.print_json(&SubmitOutput { schema: SUBMIT_SCHEMA, script, job })?;
+        }
+        return Ok(Exit::Done);
+    };
     let done = cluster::submit(context, &chosen.job, chosen.shards, chosen.measured.as_ref())?;
     let job = &done.record;
     if context.json {
-        let (schema, script) = ("updraft.cluster-submit/1", Some(done.script.clone()));
-        context.print_json(&JobOutput { schema, script, job })?;
+        let (script, job) = (Some(done.script.clone()), Some(job.clone()));
+        context.print_json(&SubmitOutput { schema: SUBMIT_SCHEMA, script, job })?;
     }
     context.result(&done.script)?;
     context.say(&format!(
-        "Submitted array {} ({} tasks) and merge {}: {}",
+        "Submitted array {} ({}) and merge {}: {}",
         job.array_job,
-        job.shards,
+        words::count(job.shards as usize, "task"),
         job.merge_job,
         crate::base::plain::Shown::shown(&*done.script)
     ));

@@ -44,8 +44,11 @@ fn text(status: &Status) -> String {
     if !status.ended.is_empty() && status.running + status.waiting == 0 {
         lines.push("  submit the same command again: only what is missing is made".to_owned());
     }
-    if status.done == status.items {
-        lines.push("  complete".to_owned());
+    if status.complete {
+        lines.push("  complete  all results are there and were put together".to_owned());
+    } else if status.done == status.items && !status.merge_waits {
+        lines.push("  open      all results are there, but were not put together:".to_owned());
+        lines.push(format!("            {} --no-fly", status.command));
     }
     lines.push(format!("  output    {}", status.folder.shown()));
     lines.join("\n") + "\n"
@@ -60,7 +63,11 @@ fn tasks(status: &Status) -> String {
         0 => String::new(),
         age_s => format!(" ({age_s} s ago)"),
     };
-    format!("  tasks     {} running, {} waiting{merge}{age}", status.running, status.waiting)
+    let why = match status.waiting_for.as_slice() {
+        [] => String::new(),
+        reasons => format!(" ({})", reasons.join(", ")),
+    };
+    format!("  tasks     {} running, {} waiting{why}{merge}{age}", status.running, status.waiting)
 }
 
 fn shards(

@@ -125,7 +125,11 @@ mod tests {
             ("127.0.0.1:8700", None, Some("cross-site")),
             ("127.0.0.1:8700", None, Some("same-site")),
         ] {
-            assert_eq!(get(host, origin, site), Err(Status::Forbidden), "{host} {origin:?} {site:?}");
+            assert_eq!(
+                get(host, origin, site),
+                Err(Status::Forbidden),
+                "{host} {origin:?} {site:?}"
+            );
         }
         let post = |origin| door.admit(&request(Method::Post, "127.0.0.1:8700", origin, None));
         assert_eq!(post(None), Err(Status::Forbidden), "who posts says from where");

@@ -31,4 +31,4 @@ pub use result::{
 pub use setup::{Airs, Setup};
 pub(super) use template::BUILTIN;
 pub use template::{SENSITIVITY_TEMPLATE_SCHEMA, SensitivityPlan};
-pub use work::{Done, Fly, Gathered, NotDone, SensitivityWork};
+pub use work::{Done, Fly, Gathered, NotDone, SensitivityWork, sensitivity_sha256};

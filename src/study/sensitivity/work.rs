@@ -86,15 +86,6 @@ impl<'a> SensitivityWork<'a> {
         Ok(Self { study, folder, drawn, rows })
     }
 
-    /// SHA-256 of what all campaigns of the study have in common, hexadecimal.
-    ///
-    /// # Errors
-    /// [`StudyError::Record`] if the settings have no form as JSON.
-    pub fn sha256(&self) -> Result<String, StudyError> {
-        // The key of one has all of it.
-        key(self.study, &self.drawn.item(0))
-    }
-
     /// Numbers of the campaigns that are not finished, of those that `takes` takes.
     pub fn missing(&self, takes: &(dyn Fn(usize) -> bool + Sync)) -> Vec<usize> {
         self.open_indices(takes)
@@ -212,6 +203,15 @@ impl<'a> SensitivityWork<'a> {
 
 fn key(study: &SensitivityPlan, item: &Item) -> Result<String, StudyError> {
     study.key(item).map_err(|error| record_error(item, error))
+}
+
+/// SHA-256 of what all campaigns of a study have in common, hexadecimal.
+///
+/// # Errors
+/// [`StudyError::Record`] if the settings have no form as JSON.
+pub fn sensitivity_sha256(study: &SensitivityPlan, seed: u64) -> Result<String, StudyError> {
+    // The key of one has all of it.
+    key(study, &study.drawn(seed).item(0))
 }
 
 fn record_error(item: &Item, source: serde_json::Error) -> StudyError {

@@ -35,6 +35,9 @@ pub struct AnalysisRecord {
     pub settings_sha256: String,
     /// Files that were there to be analysed.
     pub inputs: Vec<InputState>,
+    /// Files that the analysis has written.
+    #[serde(default)]
+    pub outputs: Vec<OutputState>,
     /// Number of logs.
     pub logs: usize,
     /// Number of logs that gave a drone's results.
@@ -55,6 +58,16 @@ pub struct InputState {
     pub bytes: u64,
     /// Unix time of the last change, ms.
     pub modified_unix_ms: u64,
+}
+
+/// File that an analysis has written.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutputState {
+    /// Path of the file, from the folder of the analysis.
+    pub path: String,
+    /// Size, bytes.
+    pub bytes: u64,
 }
 
 /// One of many campaigns after its analysis.
@@ -80,6 +93,11 @@ impl EachDone {
 /// Ending of all: with losses if a campaign's analysis failed or lost something.
 pub fn ending(all: &[EachDone]) -> Ending {
     Ending::of_losses(!all.iter().all(EachDone::is_whole))
+}
+
+/// Ending of a shard: with losses if an analysis failed. One of logs with losses is complete.
+pub fn ending_of_shard(all: &[EachDone]) -> Ending {
+    Ending::of_losses(all.iter().any(|done| done.result.is_err()))
 }
 
 /// Analyses the campaigns of a share, each into its own folder. `requests` have one path each; `hold` is the
@@ -121,7 +139,11 @@ pub fn each(
         match &result {
             Err(WorkflowError::Interrupted) => return Err(WorkflowError::Interrupted),
             Err(error) => host.warn(&format!("{}: {}", path.shown(), with_reasons(error))),
-            Ok(_) => {}
+            Ok(record) => {
+                for problem in &record.problems {
+                    host.warn(&format!("{}: {problem}", path.shown()));
+                }
+            }
         }
         all.push(EachDone { path, folder, result, was_there });
     }
@@ -148,6 +170,7 @@ fn one(
     let analysed = Analysing::begin(host, &work, settings, hold)?.run(true)?;
     analysed.write(host, folder)?;
     let record = AnalysisRecord {
+        outputs: outputs(folder)?,
         logs: analysed.logs,
         used: analysed.used(),
         problems: analysed.problems(),
@@ -172,7 +195,27 @@ fn found(folder: &Path, wanted: &AnalysisRecord) -> Option<AnalysisRecord> {
         && record.made_by == wanted.made_by
         && record.settings_sha256 == wanted.settings_sha256
         && record.inputs == wanted.inputs;
-    (fits && folder.join("analysis.json").is_file()).then_some(record)
+    let is_there = |output: &OutputState| {
+        std::fs::metadata(folder.join(&output.path)).is_ok_and(|found| found.len() == output.bytes)
+    };
+    (fits && !record.outputs.is_empty() && record.outputs.iter().all(is_there)).then_some(record)
+}
+
+/// Files that an analysis writes: numbers, fields and pages.
+fn outputs(folder: &Path) -> Result<Vec<OutputState>, WorkflowError> {
+    let mut files = vec![folder.join("analysis.json")];
+    for below in ["fields", "report", "report/figures"] {
+        files.extend(files_in(&folder.join(below))?);
+    }
+    files.retain(|file| file.is_file());
+    let state = |file: &PathBuf| {
+        let found = std::fs::metadata(file).map_err(|error| FileError::new("read", file, error))?;
+        let path = file.strip_prefix(folder).unwrap_or(file).shown().to_string();
+        Ok(OutputState { path, bytes: found.len() })
+    };
+    let mut states = files.iter().map(state).collect::<Result<Vec<_>, FileError>>()?;
+    states.sort();
+    Ok(states)
 }
 
 /// Record that an analysis would have, without what comes of it.
@@ -191,6 +234,7 @@ fn wanted(
         made_by: made_by(),
         settings_sha256: sha256(settings.as_bytes()),
         inputs: inputs(path)?,
+        outputs: Vec::new(),
         logs: 0,
         used: 0,
         problems: Vec::new(),

@@ -155,6 +155,9 @@ impl<'a> Gathering<'a> {
             self.seen.insert(id.clone(), folder.to_owned());
             return Ok(self.told(folder, Some(id), Outcome::Unchanged, None));
         }
+        if let Some(done) = self.known_elsewhere(folder, &sources.inputs_sha256) {
+            return Ok(done);
+        }
         let campaign = Campaign::read(sources)?;
         let id = campaign.id.clone();
         if let Some(other) = self.seen.get(&id) {
@@ -187,6 +190,24 @@ impl<'a> Gathering<'a> {
         Ok(self.told(folder, Some(id), outcome, None))
     }
 
+    /// A campaign whose files are, byte by byte, those of one that was gathered from another folder: a copy, or, if that
+    /// folder has it no more, the same one moved or renamed.
+    fn known_elsewhere(&mut self, folder: &Path, inputs_sha256: &str) -> Option<Gathered> {
+        let is_same = |of: &&ArchivedCampaign| {
+            of.inputs_sha256 == inputs_sha256 && of.folder != folder && self.is_whole(of)
+        };
+        let other = self.index.campaigns.iter().find(is_same)?.clone();
+        if self.seen.contains_key(&other.id) || analysis_path(&other.folder).is_file() {
+            let reason = format!("it is a copy of {}", other.folder.shown());
+            return Some(self.told(folder, Some(other.id), Outcome::Copy, Some(reason)));
+        }
+        self.seen.insert(other.id.clone(), folder.to_owned());
+        let id = other.id.clone();
+        self.index.put(ArchivedCampaign { folder: folder.to_owned(), ..other });
+        self.is_changed = true;
+        Some(self.told(folder, Some(id), Outcome::Unchanged, None))
+    }
+
     /// A campaign whose id another folder of this run has.
     fn twice(&self, campaign: &Campaign, other: &Path) -> Gathered {
         let held = self.index.of_id(&campaign.id);
@@ -203,10 +224,12 @@ impl<'a> Gathering<'a> {
         self.told(campaign.folder(), Some(campaign.id.clone()), outcome, Some(reason))
     }
 
-    /// Whether all files of a campaign are there.
+    /// Whether all files of a campaign are there, none of them cut short.
     fn is_whole(&self, campaign: &ArchivedCampaign) -> bool {
-        let mut parts = campaign.parts.iter();
-        parts.all(|part| campaign.place(self.archive, part).join(PART_FILE).is_file())
+        campaign.parts.iter().all(|part| {
+            let file = std::fs::metadata(campaign.place(self.archive, part).join(PART_FILE));
+            file.is_ok_and(|file| file.is_file() && (part.bytes == 0 || part.bytes == file.len()))
+        })
     }
 
     fn told(
@@ -244,6 +267,13 @@ impl<'a> Gathering<'a> {
         };
         let gone: Vec<ArchivedCampaign> =
             self.index.campaigns.iter().filter(is_gone).cloned().collect();
+        if gone.len() == self.index.campaigns.len() && !gone.is_empty() {
+            return Err(WorkflowError::Usage(format!(
+                "--prune would remove every campaign of {}: are their disks mounted? Nothing was removed; an \
+                 archive that is not needed any more can be deleted as a folder",
+                self.archive.shown()
+            )));
+        }
         for campaign in gone {
             self.remove(&campaign.id)
                 .map_err(|error| WorkflowError::Failed(with_causes(&error, ": ")))?;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::results::Results;
 use crate::base::plain::Shown as _;
+use crate::campaign::items::{self, ItemsRecord};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::words::shell;
 
@@ -24,13 +25,30 @@ pub struct Resources {
     pub more: Vec<String>,
 }
 
+/// Items of a command's work, each with a file of its result.
+#[derive(Clone, Debug)]
+pub struct Items {
+    /// A result, in a word or two: "blind flight".
+    pub name: &'static str,
+    /// Folder of the work.
+    pub folder: PathBuf,
+    /// Files of the results.
+    pub results: Results,
+    /// File that the merge writes when it has put all results together; `None`: it writes none of its own.
+    pub product: Option<PathBuf>,
+    /// Settings that all items of the folder have; `None`: each item is checked by itself.
+    pub record: Option<ItemsRecord>,
+    /// Whether items are made in a folder that can be chosen with `--scratch` and was not.
+    pub has_scratch: bool,
+}
+
 /// Work that is shared out to the tasks of an array.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// The command that is run, without its options: `blind`.
     pub command: &'static str,
-    /// A result, in a word or two: "blind flight".
-    pub item: &'static str,
+    /// Items of the work.
+    pub items: Items,
     /// Path of the program.
     pub program: PathBuf,
     /// Arguments of the program, without those that share the work out.
@@ -39,10 +57,6 @@ pub struct Job {
     pub cwd: PathBuf,
     /// Folder for scripts, output and record of the job.
     pub folder: PathBuf,
-    /// Files of the results.
-    pub results: Results,
-    /// Whether items are made in a folder of the machine's own, which the command takes with `--scratch`.
-    pub has_scratch: bool,
     /// Resources of each task.
     pub resources: Resources,
 }
@@ -60,19 +74,33 @@ impl Job {
         let given = options.into_iter().flatten().chain(&resources.more).chain(&self.args);
         let given = given.map(String::as_str).chain(paths.iter().map(AsRef::as_ref));
         for text in given {
-            if text.contains(['\n', '\r', '\0']) {
+            if text.contains(char::is_control) {
                 return Err(WorkflowError::Usage(format!(
-                    "a script for Slurm cannot have a line break in an argument or a path: {text:?}"
+                    "a script for Slurm cannot have a line break, a tab or another control character in an \
+                     argument or a path: {text:?}"
                 )));
             }
         }
-        if self.folder.to_string_lossy().contains('"') || self.cwd.to_string_lossy().contains('"') {
-            return Err(WorkflowError::Usage(format!(
-                "a script for Slurm cannot have a quotation mark in a path: {}",
-                self.folder.shown()
-            )));
+        // Options of sbatch have no way to write these.
+        for path in [&self.folder, &self.cwd] {
+            if path.to_string_lossy().contains(['"', '\\']) {
+                return Err(WorkflowError::Usage(format!(
+                    "a script for Slurm cannot have a quotation mark or a backslash in a path: {}",
+                    path.shown()
+                )));
+            }
         }
         Ok(())
+    }
+
+    /// Refuses a folder that holds other work, whose results would be taken for this one's.
+    ///
+    /// # Errors
+    ///
+    /// If the results there are of other settings, another version or another kind.
+    pub fn fits(&self) -> Result<(), WorkflowError> {
+        let Some(record) = &self.items.record else { return Ok(()) };
+        Ok(items::check(&self.items.folder, record)?)
     }
 
     /// The command line, for people and shells.

@@ -31,7 +31,7 @@ pub struct Measured {
 ///
 /// If the process cannot be started or fails.
 pub fn measure(host: &dyn Host, job: &Job) -> Result<Option<Measured>, WorkflowError> {
-    let finished = job.results.finished();
+    let finished = job.items.results.finished();
     let missing = finished.iter().filter(|finished| finished.is_none()).count();
     let Some(item) = finished.iter().position(Option::is_none) else { return Ok(None) };
     let shard = format!("{}/{}", item + 1, finished.len());

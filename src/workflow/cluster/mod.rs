@@ -12,11 +12,11 @@ mod script;
 mod status;
 mod submit;
 
-pub use job::{Job, Resources};
+pub use job::{Items, Job, Resources};
 pub use measure::{Measured, TASK_S, choose, measure};
 pub use queue::{MIN_PERIOD_S, MOST_TASKS, most_tasks};
 pub use record::{CLUSTER_SCHEMA, ClusterRecord, cluster_folder};
 pub use results::Results;
 pub use script::submit_script;
 pub use status::{ShardState, Status, status};
-pub use submit::{Submitted, cancel, submit};
+pub use submit::{Cancelled, Submitted, cancel, submit};

@@ -1,6 +1,6 @@
 //! Questions to the scheduler: how large an array may be, and which tasks are in its queue.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde::{Deserialize, Serialize};
@@ -59,8 +59,17 @@ pub(super) struct Queue {
     pub(super) age_s: u64,
 }
 
+/// Forgets the scheduler's last answer: the next one asks anew.
+pub(super) fn forget(folder: &Path) {
+    let _ = std::fs::remove_file(queue_path(folder));
+}
+
+fn queue_path(folder: &Path) -> PathBuf {
+    folder.join("queue.json")
+}
+
 pub(super) fn ask(record: &ClusterRecord, folder: &Path, now_unix_s: u64) -> Queue {
-    let path = folder.join("queue.json");
+    let path = queue_path(folder);
     let jobs = vec![record.array_job.clone(), record.merge_job.clone()];
     let last: Option<Answer> = read_json(&path).ok();
     let fresh = last.filter(|last| {
@@ -85,7 +94,8 @@ fn squeue(jobs: &[String]) -> Result<Vec<Queued>, String> {
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
         // The scheduler forgets jobs some minutes after their end.
-        return if said.contains("Invalid job id") { Ok(Vec::new()) } else { Err(said) };
+        let first = said.lines().next().unwrap_or("squeue failed").to_owned();
+        return if said.contains("Invalid job id") { Ok(Vec::new()) } else { Err(first) };
     }
     Ok(String::from_utf8_lossy(&output.stdout).lines().filter_map(queued).collect())
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::job::Job;
 use super::results::Results;
+use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
 use crate::campaign::read_json;
 use crate::workflow::error::WorkflowError;
@@ -32,6 +33,9 @@ pub struct ClusterRecord {
     pub item: String,
     /// Files of the results.
     pub results: Results,
+    /// File that the merge writes; absent: none of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub product: Option<PathBuf>,
     /// Number of shards.
     pub shards: u32,
     /// Number of the array job.
@@ -50,8 +54,9 @@ impl ClusterRecord {
             schema: CLUSTER_SCHEMA.to_owned(),
             made_by: made_by.to_owned(),
             command: job.line(),
-            item: job.item.to_owned(),
-            results: job.results.clone(),
+            item: job.items.name.to_owned(),
+            results: job.items.results.clone(),
+            product: job.items.product.as_ref().map(|product| job.cwd.join(product)),
             shards,
             array_job: ARRAY.to_owned(),
             merge_job: MERGE.to_owned(),
@@ -73,6 +78,10 @@ impl ClusterRecord {
         let places = [folder.to_owned(), cluster_folder(folder)];
         let found = places.iter().find(|place| record_path(place).is_file());
         let Some(place) = found else {
+            if !folder.is_dir() {
+                let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
+                return Err(FileError::new("look into", folder, missing).into());
+            }
             return Err(WorkflowError::Nothing(format!(
                 "{} has no job of `updraft cluster submit`: give the folder of its results",
                 folder.shown()

@@ -32,10 +32,10 @@ pub fn submit_script(
         "# Submits an array job and the job that puts its results together. Run it where sbatch is: bash FILE",
     );
     line(&format!("# {}", job.line()));
-    let each = job.results.count().div_ceil(shards.max(1) as usize);
+    let each = job.items.results.count().div_ceil(shards.max(1) as usize);
     line(&format!(
         "# {}, {} of up to {each}{}",
-        words::count(job.results.count(), "item"),
+        words::count(job.items.results.count(), "item"),
         words::count(shards as usize, "task"),
         told(measured)
     ));
@@ -44,14 +44,18 @@ pub fn submit_script(
     line(&format!("folder={folder}"));
     line("mkdir -p \"$folder\"");
     line("");
-    line("array=$(sbatch --parsable <<'ARRAY'");
+    line("# Tasks other than all of them may be named: bash FILE 7-9,12");
+    line(&format!("array=$(sbatch --parsable --array=\"${{1:-1-{shards}}}\" <<'ARRAY'"));
     line("#!/bin/bash");
-    line(&options(job, job.command, Some(shards)));
+    line(&options(job, job.command, true));
     line(
         "# exec: the scheduler's signals reach the program, which then ends with what is finished.",
     );
-    let scratch = if job.has_scratch { " --scratch \"${TMPDIR:-/tmp}\"" } else { "" };
-    line(&format!("exec {}{scratch} --no-progress --shard slurm", job.exec()));
+    let scratch = if job.items.has_scratch { " --scratch \"${TMPDIR:-/tmp}\"" } else { "" };
+    line(&format!(
+        "exec {}{scratch} --no-progress --shard \"$SLURM_ARRAY_TASK_ID/{shards}\"",
+        job.exec()
+    ));
     line("ARRAY");
     line(")");
     line("array=${array%%;*}");
@@ -59,7 +63,7 @@ pub fn submit_script(
     line("# After any end of the array: it says what is missing, if anything is.");
     line("merge=$(sbatch --parsable --dependency=afterany:\"$array\" <<'MERGE'");
     line("#!/bin/bash");
-    line(&options(job, &format!("{}-merge", job.command), None));
+    line(&options(job, &format!("{}-merge", job.command), false));
     line(&format!("exec {} --no-progress --no-fly", job.exec()));
     line("MERGE");
     line(")");
@@ -81,15 +85,12 @@ fn told(measured: Option<&Measured>) -> String {
 }
 
 /// Options of sbatch at the head of a script.
-fn options(job: &Job, name: &str, shards: Option<u32>) -> String {
+fn options(job: &Job, name: &str, is_array: bool) -> String {
     let resources = &job.resources;
     let mut text = format!("#SBATCH --job-name=updraft-{name}");
     let mut option = |name: &str, value: &str| {
         let _ = write!(text, "\n#SBATCH --{name}={value}");
     };
-    if let Some(shards) = shards {
-        option("array", &format!("1-{shards}"));
-    }
     option("nodes", "1");
     option("ntasks", "1");
     option("cpus-per-task", &resources.cpus.to_string());
@@ -107,7 +108,7 @@ fn options(job: &Job, name: &str, shards: Option<u32>) -> String {
     option("chdir", &format!("\"{}\"", job.cwd.to_string_lossy()));
     // A percent sign begins a pattern there.
     let folder = job.folder.to_string_lossy().replace('%', "%%");
-    let file = if shards.is_some() { "array-%A-%a.out" } else { "merge-%j.out" };
+    let file = if is_array { "array-%A-%a.out" } else { "merge-%j.out" };
     option("output", &format!("\"{folder}/{file}\""));
     // A task that starts again writes on.
     option("open-mode", "append");

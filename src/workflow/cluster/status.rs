@@ -1,7 +1,8 @@
 //! Progress of a job, counted in files.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use std::time::UNIX_EPOCH;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -67,6 +68,10 @@ pub struct Status {
     pub ended: Vec<ShardState>,
     /// Whether the job that puts the results together is in the queue.
     pub merge_waits: bool,
+    /// Whether all results are there and were put together since.
+    pub complete: bool,
+    /// Why tasks wait in the queue, in the scheduler's words, each reason once.
+    pub waiting_for: Vec<String>,
     /// Folder of scripts and output.
     pub folder: PathBuf,
 }
@@ -133,8 +138,26 @@ pub fn status(host: &dyn Host, folder: &std::path::Path) -> Result<Status, Workf
         stuck,
         ended,
         merge_waits: tasks.iter().any(|task| task.id == record.merge_job),
+        complete: done == finished.len() && is_merged(&record, &finished),
+        waiting_for: tasks
+            .iter()
+            .filter(of_array)
+            .filter(|task| !is_running(task) && !task.place.is_empty())
+            .map(|task| task.place.trim_matches(['(', ')']).to_owned())
+            .collect::<BTreeSet<_>>()
+            .into_iter()
+            .collect(),
         folder: place,
     })
+}
+
+/// Whether the merge has written its file since the last result.
+fn is_merged(record: &ClusterRecord, finished: &[Option<u64>]) -> bool {
+    let Some(product) = &record.product else { return true };
+    let written = std::fs::metadata(product).and_then(|found| found.modified()).ok();
+    let since = written.and_then(|at| at.duration_since(UNIX_EPOCH).ok());
+    let last_ms = finished.iter().flatten().max().copied().unwrap_or(0);
+    since.is_some_and(|since| since.as_millis() >= u128::from(last_ms))
 }
 
 fn is_running(task: &Queued) -> bool {
@@ -186,10 +209,11 @@ fn rate(
     let from_s = record.submitted_unix_s.max(now_s.saturating_sub(RATE_OVER_S));
     let lately = finished.iter().flatten().filter(|ms| **ms / 1000 >= from_s).count();
     let over_s = now_s.saturating_sub(from_s) as f64;
-    if lately < 2 || over_s < 1.0 {
+    let missing = finished.iter().filter(|finished| finished.is_none()).count();
+    // When all is done, the rate would only sink.
+    if lately < 2 || over_s < 1.0 || missing == 0 {
         return (None, None);
     }
     let per_s = lately as f64 / over_s;
-    let missing = finished.iter().filter(|finished| finished.is_none()).count();
     (Some(per_s * 60.0), Some(missing as f64 / per_s))
 }

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use super::job::Job;
 use super::measure::Measured;
-use super::queue::{ask, must};
+use super::queue::{ask, forget, must};
 use super::record::ClusterRecord;
 use super::script::submit_script;
 use crate::base::file::write_whole;
@@ -61,13 +61,29 @@ pub fn submit(
     Ok(Submitted { record, script })
 }
 
-/// Takes a job and its merge out of the queue; tasks that run end with what is finished. Returns its record.
+/// A job that was to be taken out of the queue.
+#[derive(Clone, Debug)]
+pub struct Cancelled {
+    /// Record of the job.
+    pub record: ClusterRecord,
+    /// Whether anything of it was in the queue.
+    pub was_queued: bool,
+}
+
+/// Takes a job and its merge out of the queue; tasks that run end with what is finished.
 ///
 /// # Errors
 ///
 /// If the folder has no job, or the scheduler refuses.
-pub fn cancel(folder: &Path) -> Result<ClusterRecord, WorkflowError> {
-    let (record, _) = ClusterRecord::read(folder)?;
-    must("scancel", &[&record.array_job, &record.merge_job])?;
-    Ok(record)
+pub fn cancel(host: &dyn Host, folder: &Path) -> Result<Cancelled, WorkflowError> {
+    let (record, place) = ClusterRecord::read(folder)?;
+    // What was in the queue before says nothing of now.
+    forget(&place);
+    let queued = ask(&record, &place, host.clock().unix_us() / 1_000_000).queued;
+    forget(&place);
+    let was_queued = queued.map_or(true, |queued| !queued.is_empty());
+    if was_queued {
+        must("scancel", &[&record.array_job, &record.merge_job])?;
+    }
+    Ok(Cancelled { record, was_queued })
 }

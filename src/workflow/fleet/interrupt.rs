@@ -103,7 +103,8 @@ impl<'a> Interrupt<'a> {
                  15 s, or Ctrl-C again: {words}. "
             );
             let may_ask = self.asks && self.host.sees_questions();
-            let Some(answers) = may_ask.then(|| self.host.offer(&text, &ANSWERS).ok()).flatten() else {
+            let Some(answers) = may_ask.then(|| self.host.offer(&text, &ANSWERS).ok()).flatten()
+            else {
                 return Some(default);
             };
             let count = self.host.interruptions();

@@ -111,9 +111,8 @@ impl AirWatch {
             (Arc::clone(host.clock()), Arc::clone(station), Arc::clone(&shared));
         let body = move || watch(&of, &clock, &station, &found, &reference);
         let thread = std::thread::Builder::new().name("live air".to_owned()).spawn(body);
-        let thread = thread.map_err(|error| {
-            WorkflowError::Failed(format!("failed to start a thread: {error}"))
-        })?;
+        let thread = thread
+            .map_err(|error| WorkflowError::Failed(format!("failed to start a thread: {error}")))?;
         Ok(Some(Self { shared, thread: Some(thread) }))
     }
 }
@@ -191,13 +190,11 @@ fn watch(
         if !found.logs.is_empty() {
             let work = Work::default();
             let input = one_input(&work, &found);
-            let looked = pool.install(|| {
-                analyze_flight(&input, &settings.options, Some(reference), &|_, _| {})
-            });
+            let looked = pool
+                .install(|| analyze_flight(&input, &settings.options, Some(reference), &|_, _| {}));
             // Too little was heard yet, for example: the next look may have more.
             if let Some(map) = looked.ok().and_then(|flight| flight.map) {
-                let rate_hz =
-                    station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
+                let rate_hz = station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
                 let (view, of) = shown(&map, [from_s, show_s], rate_hz);
                 station.air(Some(view), of);
             }
@@ -241,7 +238,8 @@ fn shown(
     let view = AirView {
         provisional: true,
         time_s: latest_s,
-        fleet_mps: fleet.map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se].map(centi)),
+        fleet_mps: fleet
+            .map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se].map(centi)),
         map: grid,
         note: format!(
             "From telemetry at {rate_hz:.1} Hz: the mean is over the last {:.0} s, the colours are 10 s means. \

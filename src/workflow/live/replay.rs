@@ -89,7 +89,8 @@ pub(crate) fn replay(
 
 /// The flight that is meant.
 fn chosen<'a>(work: &'a Work, name: Option<&str>) -> Result<&'a Found, WorkflowError> {
-    let names = || work.flights.iter().map(|found| found.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names =
+        || work.flights.iter().map(|found| found.name.as_str()).collect::<Vec<_>>().join(", ");
     let found = match name {
         Some(name) => work.flights.iter().find(|found| found.name == name).ok_or_else(|| {
             WorkflowError::Usage(format!("the campaign has no flight \"{name}\", but {}", names()))
@@ -189,7 +190,11 @@ fn track(
         let north = moved(&flight.north_m, time_s)?;
         let east = moved(&flight.east_m, time_s)?;
         let show = frame.from_neu([north, east, 0.0].into());
-        let at = [place.home_m[0] + show.x, place.home_m[1] + show.y, flight.height_m.at(time_s, GAP_S)?];
+        let at = [
+            place.home_m[0] + show.x,
+            place.home_m[1] + show.y,
+            flight.height_m.at(time_s, GAP_S)?,
+        ];
         Some(at.map(|value| value as f32))
     });
     let voltage = flight.voltage_v.as_ref();

@@ -10,14 +10,15 @@ use self::campaign::Campaigns;
 use super::error::WorkflowError;
 use super::host::Host;
 use super::made_by;
-use super::share::{ShardDone, numbers, on_threads};
+use super::share::{self, ShardDone, numbers, on_threads};
 use crate::base::file::{write_whole, write_with};
 use crate::base::shard::{Shard, Share};
-use crate::campaign::items::{self, ItemsRecord};
+use crate::campaign::items::ItemsRecord;
 use crate::campaign::to_json;
 use crate::report::{self, Provenance};
 use crate::study::sensitivity::{
-    Gathered, SensitivityPlan, SensitivityResult, SensitivityWork, evaluate, table,
+    Gathered, SensitivityPlan, SensitivityResult, SensitivityWork, evaluate, sensitivity_sha256,
+    table,
 };
 
 /// Name of the built-in sensitivity study.
@@ -50,15 +51,11 @@ pub struct Settings {
 pub fn join(
     host: &dyn Host,
     folder: &Path,
+    (study, seed): (&SensitivityPlan, u64),
     work: &SensitivityWork<'_>,
     share: Share,
 ) -> Result<(), WorkflowError> {
-    let what = "campaigns of a study";
-    let record = ItemsRecord::new(made_by(), what, work.sha256()?, host.command());
-    match share.shard {
-        Some(_) => items::join(folder, &record)?,
-        None => items::take_over(folder, &record)?,
-    }
+    share::join(folder, &record(study, seed, host.command())?, share, true)?;
     let missing =
         if share.gather_only { work.missing(&|item| share.takes(item)) } else { Vec::new() };
     if missing.is_empty() {
@@ -67,6 +64,19 @@ pub fn join(
     let (count, of) = (missing.len(), share.count(work.total()));
     let missing = numbers(&missing);
     Err(WorkflowError::Missing { what: "campaigns of the study", count, of, missing })
+}
+
+/// Record of a study's campaigns; `command`: for people.
+///
+/// # Errors
+/// If the settings have no form as JSON.
+pub fn record(
+    study: &SensitivityPlan,
+    seed: u64,
+    command: String,
+) -> Result<ItemsRecord, WorkflowError> {
+    let settings = sensitivity_sha256(study, seed)?;
+    Ok(ItemsRecord::new(made_by(), "campaigns of a study", settings, command))
 }
 
 /// Outcome of a shard of a study.

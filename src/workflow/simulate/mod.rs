@@ -154,7 +154,8 @@ pub(crate) fn make_ready<'a>(
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {
         let path = folder.simulated_log(*slot, count);
-        host.warn(&format!("{} is not as it was flown ({how}): flown again", path.shown()));
+        let then = if simulation.share.gather_only { "it is missing" } else { "flown again" };
+        host.warn(&format!("{} is not as it was flown ({how}): {then}", path.shown()));
     }
     record.logs.retain(|log| !changed.contains_key(&log.slot));
     let is_open = |slot: &&Slot| {

@@ -93,7 +93,32 @@ fn a_file_that_was_lost_from_the_archive_comes_back() {
     let part = parts(&bench.path("archive"), "seconds").remove(0);
     fs::remove_file(bench.path("archive").join(&part)).unwrap();
     assert_eq!(outcomes(&archive(&bench, 0, &["june"])), pairs(&[("june", "replaced")]));
-    assert!(bench.path("archive").join(part).is_file());
+    assert!(bench.path("archive").join(&part).is_file());
+    // One that was cut short, too.
+    let whole = fs::read(bench.path("archive").join(&part)).unwrap();
+    fs::write(bench.path("archive").join(&part), &whole[..whole.len() / 2]).unwrap();
+    assert_eq!(outcomes(&archive(&bench, 0, &["june"])), pairs(&[("june", "replaced")]));
+    assert_eq!(fs::read(bench.path("archive").join(part)).unwrap(), whole);
+}
+
+#[test]
+fn copies_under_other_names_count_once_and_a_lost_disk_prunes_nothing() {
+    let bench = Bench::new();
+    Campaign::on_day(0).write(&bench.path("data/june"));
+    Campaign::on_day(0).write(&bench.path("data/june (copy)"));
+    let said = archive(&bench, 0, &["data"]);
+    assert_eq!(outcomes(&said), pairs(&[("june", "added"), ("june (copy)", "copy")]));
+    assert_eq!(said["held"], 1);
+    // Renamed, it is the same campaign.
+    fs::remove_dir_all(bench.path("data/june")).unwrap();
+    let said = archive(&bench, 0, &["data", "--prune"]);
+    assert_eq!(outcomes(&said), pairs(&[("june (copy)", "unchanged")]));
+    assert_eq!(said["held"], 1);
+    fs::rename(bench.path("data"), bench.path("elsewhere")).unwrap();
+    fs::create_dir(bench.path("data")).unwrap();
+    let refused = bench.expect(2, &["archive", "data", "--prune"]);
+    assert!(refused.err.contains("would remove every campaign"), "{refused}");
+    assert_eq!(parts(&bench.path("archive"), "flights").len(), 1);
 }
 
 #[test]

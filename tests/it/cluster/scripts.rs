@@ -86,7 +86,7 @@ fn one_item_is_measured_and_counts() {
     let script = expect(&bench, 0, &["cluster", "script", "sweep", "small.toml", "-o", "study"]);
     assert!(script.err.contains("8 missing, shared out to 1 task"), "{script}");
     assert!(
-        script.out.contains("#SBATCH --array=1-1\n") && script.out.contains("#SBATCH --time=0:0"),
+        script.out.contains("--array=\"${1:-1-1}\"") && script.out.contains("#SBATCH --time=0:0"),
         "{script}"
     );
     assert_eq!(fs::read_dir(bench.path("study/cells")).unwrap().count(), 1);
@@ -114,7 +114,7 @@ fn a_job_is_submitted_watched_and_cancelled() {
     assert!(submitted.err.contains("Submitted array 42 (3 tasks) and merge 43"), "{submitted}");
     assert_eq!(
         asked(&bench)[1..],
-        ["sbatch --parsable", "sbatch --parsable --dependency=afterany:42"]
+        ["sbatch --parsable --array=1-3", "sbatch --parsable --dependency=afterany:42"]
     );
     // One task has made its results and ended, one runs, one waits.
     bench.expect(0, &["sweep", "small.toml", "-o", "study", "--shard", "2/3"]);
@@ -157,7 +157,8 @@ fn shards_that_ended_without_their_results_are_told() {
 #[test]
 fn a_script_runs_whatever_its_folder_is_called() {
     let bench = Bench::new();
-    let run_now = "if [ -n \"$(echo $*)\" ]; then :; fi\nsed -n '/^exec /p' | sed 's/--shard slurm/--shard 1\\/1/' > job.$$; (. ./job.$$) >> ran.txt 2>&1; echo 7";
+    let run_now =
+        "sed -n '/^exec /p' > job.$$; (SLURM_ARRAY_TASK_ID=1; . ./job.$$) >> ran.txt 2>&1; echo 7";
     scheduler(&bench, &[("sbatch", run_now)]);
     fs::write(bench.path("it's $HOME `x` 100%.toml"), SMALL).unwrap();
     let folder = "out $(touch evil) `touch evil` 'a' 5%";
@@ -174,4 +175,42 @@ fn a_script_runs_whatever_its_folder_is_called() {
     assert!(record.contains("touch evil"), "{record}");
     let quoted = expect(&bench, 2, &["cluster", "script", "sweep", "-o", "a\"b", "--shards", "1"]);
     assert!(quoted.err.contains("cannot have a quotation mark"), "{quoted}");
+    let tab = expect(&bench, 2, &["cluster", "script", "sweep", "-o", "a\tb", "--shards", "1"]);
+    assert!(tab.err.contains("a tab or another control character"), "{tab}");
+}
+
+#[test]
+fn a_folder_of_other_work_gets_no_job() {
+    let bench = Bench::new();
+    scheduler(&bench, &[("sbatch", "cat > /dev/null; echo 42"), ("squeue", "exit 0")]);
+    fs::write(bench.path("small.toml"), SMALL).unwrap();
+    bench.expect(0, &["sweep", "small.toml", "-o", "study", "-q"]);
+    fn submit<'a>(more: &[&'a str]) -> Vec<&'a str> {
+        [&["cluster", "submit"], more].concat()
+    }
+    let seed = expect(&bench, 2, &submit(&["sweep", "small.toml", "--seed", "9", "-o", "study"]));
+    assert!(seed.err.contains("study has items of other settings"), "{seed}");
+    let blind = ["blind", "--seed", "20270101", "--flights", "3", "-o", "study", "--shards", "2"];
+    let blind = expect(&bench, 2, &submit(&blind));
+    assert!(blind.err.contains("cells of a study, not blind flights"), "{blind}");
+    // More tasks than items are as many as there are items.
+    bench.expect(0, &["sweep", "small.toml", "-o", "more", "-q", "--shard", "1/9"]);
+    let many = ["sweep", "small.toml", "-o", "more", "--shards", "99"];
+    let many = expect(&bench, 0, &submit(&many));
+    assert!(many.err.contains("There are 9 items: 9 tasks, not 99"), "{many}");
+    // All results are there: they are not yet put together.
+    bench.expect(0, &["sweep", "small.toml", "-o", "more", "-q", "--shard", "1/1"]);
+    let status = expect(&bench, 0, &["cluster", "status", "more"]);
+    assert!(status.out.contains("were not put together:"), "{status}");
+    bench.expect(0, &["sweep", "small.toml", "-o", "more", "-q", "--no-fly"]);
+    let status = expect(&bench, 0, &["cluster", "status", "more"]);
+    assert!(status.out.contains("complete  all results are there"), "{status}");
+    let nowhere = expect(&bench, 1, &["cluster", "status", "nowhere"]);
+    assert!(nowhere.err.contains("nowhere"), "{nowhere}");
+    // A look at results changes nothing, and makes no folder.
+    let other = ["sweep", "small.toml", "-o", "more", "--seed", "3", "--no-fly"];
+    assert!(bench.expect(2, &other).err.contains("other settings"));
+    bench.expect(0, &["sweep", "small.toml", "-o", "more", "-q", "--shard", "1/3"]);
+    bench.expect(1, &["sweep", "small.toml", "-o", "nowhere", "--no-fly"]);
+    assert!(!bench.path("nowhere").exists());
 }

@@ -135,10 +135,21 @@ fn shards_of_many_analyses_make_each() {
     let analysis = fs::read(bench.path("b/analysis.json")).unwrap();
     bench.expect(0, &["analyze", "b"]);
     assert_eq!(fs::read(bench.path("b/analysis.json")).unwrap(), analysis);
-    // A log that has changed is analysed again, and one that cannot be read costs its campaign alone.
-    fs::write(bench.path("a/simulated/01.BIN"), b"no log").unwrap();
-    let again = bench.expect(3, &each);
+    // Its page tells of another command now. What is not as it was written is made again.
+    let again = bench.expect(0, &each);
     assert!(again.err.contains("2 of them before"), "{again}");
+    fs::write(bench.path("a/analysis.json"), b"{").unwrap();
+    fs::remove_file(bench.path("c/report/index.html")).unwrap();
+    let missing = bench.expect(3, &[&each[..], &["--no-fly"]].concat());
+    assert!(missing.err.contains("2 of 3 analyses missing: a, c"), "{missing}");
+    bench.expect(0, &[&each[..], &["--shard", "1/1"]].concat());
+    // A log that has changed is analysed again, and one that cannot be read costs its campaign alone. The losses are named,
+    // and the shard is complete all the same.
+    fs::write(bench.path("a/simulated/01.BIN"), b"no log").unwrap();
+    let shard = bench.expect(0, &[&each[..], &["--shard", "1/3"]].concat());
+    assert!(shard.err.contains("a: calibration: slot 1: its log is not used"), "{shard}");
+    let again = bench.expect(3, &each);
+    assert!(again.err.contains("3 of them before"), "{again}");
 }
 
 #[test]
@@ -165,6 +176,10 @@ fn shards_of_a_blind_table_make_the_table() {
         other.err.contains("many has items of other settings (made with `updraft blind"),
         "{other}"
     );
+    // A result that was cut short is missing.
+    fs::write(bench.path("many/flights/00001.json"), "{\"schema\"").unwrap();
+    let missing = expect(3, &["-o", "many", "--no-fly"]);
+    assert!(missing.err.contains("2 of 2 blind flights missing: 0, 1"), "{missing}");
     // Another number of shards takes what is there.
     expect(0, &["-o", "many", "--shard", "1/2"]);
     expect(0, &["-o", "many", "--shard", "2/2"]);

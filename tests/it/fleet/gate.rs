@@ -578,7 +578,9 @@ impl Observer for Orders<'_> {
     fn stop(&mut self, now: Micros) -> bool {
         if now >= self.at && !self.given {
             self.given = true;
-            give(self.folder, "1", Action::Return, Some(vec![drone(1)]), From::Terminal).unwrap().unwrap();
+            give(self.folder, "1", Action::Return, Some(vec![drone(1)]), From::Terminal)
+                .unwrap()
+                .unwrap();
         }
         now > self.at + 40 * S
     }

@@ -49,7 +49,12 @@ fn json_schemas_are_current() {
         (Format::Items, "items"),
         (Format::AnalysisRecord, "analysis-record"),
         (Format::Cluster, "cluster"),
+        (Format::ClusterScript, "cluster-script"),
+        (Format::ClusterSubmit, "cluster-submit"),
         (Format::ClusterStatus, "cluster-status"),
+        (Format::ClusterCancel, "cluster-cancel"),
+        (Format::Shard, "shard"),
+        (Format::AnalyzeEach, "analyze-each"),
         (Format::Archive, "archive"),
         (Format::ArchiveIndex, "archive-index"),
     ] {

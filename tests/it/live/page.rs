@@ -49,7 +49,10 @@ fn a_flight_is_started_and_ended_on_its_page() {
     let mut tab = browser.open(&look, [1280, 900]);
     tab.wait_for("!document.getElementById('question').hidden");
     assert_eq!(text(&mut tab, "question-text"), "Authorize the start?");
-    assert_eq!(tab.number("document.querySelectorAll('#question-answers button:disabled').length"), 2.0);
+    assert_eq!(
+        tab.number("document.querySelectorAll('#question-answers button:disabled').length"),
+        2.0
+    );
     assert_eq!(tab.text("location.hash"), "", "the secret left the address bar");
     let sum = text(&mut tab, "preflight-sum");
     assert_eq!(sum, "Go: all 2 drones are ready");
@@ -65,14 +68,20 @@ fn a_flight_is_started_and_ended_on_its_page() {
     tab.press(Key::Enter);
     flight.hear("Authorized.");
     tab.wait_for("document.getElementById('step').textContent === 'flying'");
-    tab.wait_for("state.drones.length === 2 && state.drones.every((d) => d.place_m && d.place_m[2] > 3)");
+    tab.wait_for(
+        "state.drones.length === 2 && state.drones.every((d) => d.place_m && d.place_m[2] > 3)",
+    );
     tab.wait_for("document.querySelectorAll('#rows tr').length === 2");
     tab.screenshot(&pictures().join("flying.png"));
 
     // A second, deliberate step brings them down; Escape takes the first one back.
     tab.press_on("#order-land", Key::Enter);
     tab.wait_for("!document.getElementById('confirm').hidden");
-    assert_eq!(tab.text("document.activeElement.id"), "confirm-no", "the safe answer has the focus");
+    assert_eq!(
+        tab.text("document.activeElement.id"),
+        "confirm-no",
+        "the safe answer has the focus"
+    );
     tab.press(Key::Escape);
     tab.wait_for("document.getElementById('confirm').hidden");
     assert_eq!(tab.text("document.activeElement.id"), "order-land");
@@ -126,7 +135,8 @@ fn a_page_finds_its_station_again_and_fits_a_phone() {
 fn a_replay_plays_jumps_and_shows_the_air() {
     let Some(mut browser) = Browser::start() else { return };
     let bench = Bench::new();
-    let run = ["run", "--grid", "2x2", "--duration", "60", "--updraft", "0.6", "-o", "campaign", "-q"];
+    let run =
+        ["run", "--grid", "2x2", "--duration", "60", "--updraft", "0.6", "-o", "campaign", "-q"];
     bench.expect(0, &run);
     let live = free_port();
     let args = ["live", "campaign", "--flight", "hover", "--speed", "30", "--listen", &live];
@@ -145,7 +155,8 @@ fn a_replay_plays_jumps_and_shows_the_air() {
     ));
     tab.wait_for(&format!("Math.abs(state.frame.show_s - {middle}) < 1"));
     tab.wait_for("state.drones.every((d) => d.air_mps !== null)");
-    let air = tab.number("state.drones.reduce((sum, d) => sum + d.air_mps, 0) / state.drones.length");
+    let air =
+        tab.number("state.drones.reduce((sum, d) => sum + d.air_mps, 0) / state.drones.length");
     assert!((air - 0.6).abs() < 0.2, "{air}");
     assert_eq!(text(&mut tab, "air-mark"), "final");
     assert_eq!(tab.number("document.querySelectorAll('#orders:not([hidden])').length"), 0.0);

@@ -121,7 +121,9 @@ fn the_page_comes_with_all_that_keeps_it_to_itself() {
     // Nothing of it comes from elsewhere, and nothing in it tells of the flight or a secret.
     assert!(!page.contains("src=\"http") && !page.contains("url(http") && !page.contains("look\""));
     assert!(get(server.address(), "/nothing", "").starts_with("HTTP/1.1 404 "));
-    assert!(ask(server.address(), "PUT / HTTP/1.1\r\nHost: x\r\n\r\n").starts_with("HTTP/1.1 405 "));
+    assert!(
+        ask(server.address(), "PUT / HTTP/1.1\r\nHost: x\r\n\r\n").starts_with("HTTP/1.1 405 ")
+    );
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl<'a> Eyes<'a> {
         let quiet = |of: &&Drone| of.outputs.is_none_or(|(at, _)| now > at + QUIET);
         let drones: Vec<DroneId> = (self.monitor.slots())
             .map(|(drone, _)| drone)
-            .filter(|drone| self.monitor.telemetry.get(*drone).filter(quiet).is_some())
+            .filter(|drone| self.monitor.telemetry.get(*drone).as_ref().is_some_and(quiet))
             .take(MOST_ASKED)
             .collect();
         for drone in drones {

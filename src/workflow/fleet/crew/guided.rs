@@ -19,8 +19,8 @@ use crate::link::conversation::{Observer as _, run_all};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::host::News;
 use crate::workflow::fleet::interrupt::Choice;
+use crate::workflow::host::News;
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> WorkflowError {

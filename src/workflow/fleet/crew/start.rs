@@ -54,7 +54,10 @@ impl<'a> Crew<'a> {
             self.cancel(start)?;
             return Err(error);
         }
-        self.step(Step::Start, "Authorized: waiting for every drone to know, then they take off by themselves");
+        self.step(
+            Step::Start,
+            "Authorized: waiting for every drone to know, then they take off by themselves",
+        );
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))?;
         self.until_taken(start)
     }
