@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::abort::{Abort, Aborted, Action};
-use super::orders::{ANSWER_SCHEMA, Answer, From, Inbox, Taken};
+use super::orders::{ANSWER_SCHEMA, Answer, Inbox, OrderFrom, Taken};
 use super::telemetry::Telemetry;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::conversation::{Conversation as _, Observer as _, Step};
@@ -28,7 +28,7 @@ pub enum Notice {
         /// Drones that are to carry it out.
         drones: Vec<DroneId>,
         /// Where it was given.
-        from: From,
+        from: OrderFrom,
     },
     /// The order has ended for a drone.
     Done {

@@ -61,13 +61,13 @@ pub struct Order {
     pub drones: Option<Vec<DroneId>>,
     /// Where it was given.
     #[serde(default)]
-    pub from: From,
+    pub from: OrderFrom,
 }
 
 /// Where an order was given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum From {
+pub enum OrderFrom {
     /// In another terminal.
     #[default]
     Terminal,
@@ -75,7 +75,7 @@ pub enum From {
     Page,
 }
 
-impl std::fmt::Display for From {
+impl std::fmt::Display for OrderFrom {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Terminal => "from another terminal",
@@ -228,7 +228,7 @@ pub fn give(
     name: &str,
     action: Action,
     drones: Option<Vec<DroneId>>,
-    from: From,
+    from: OrderFrom,
 ) -> Result<Option<Given>, FileError> {
     let folder = flight.join(ORDERS_FOLDER);
     match is_own_folder(&folder) {
@@ -275,7 +275,7 @@ mod tests {
     fn an_order_is_taken_once_and_answered() {
         let flight = tempfile::tempdir().unwrap();
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
-        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE]), From::Terminal)
+        let given = give(flight.path(), "1", Action::Land, Some(vec![DRONE]), OrderFrom::Terminal)
             .unwrap()
             .unwrap();
         let taken = inbox.take();
@@ -298,7 +298,7 @@ mod tests {
         // A station that is killed leaves its file.
         std::mem::forget(Inbox::open(flight.path(), "one".to_owned()).unwrap());
         let given =
-            give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().unwrap();
+            give(flight.path(), "1", Action::Return, None, OrderFrom::Terminal).unwrap().unwrap();
         let order = fs::read(&given.order).unwrap();
         let mut later = Inbox::open(flight.path(), "two".to_owned()).unwrap();
         assert!(later.take().is_empty(), "removed when the station begins");
@@ -316,7 +316,8 @@ mod tests {
         fs::create_dir(&folder).unwrap();
         fs::set_permissions(&folder, fs::Permissions::from_mode(0o777)).unwrap();
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
-        let given = give(flight.path(), "1", Action::Land, None, From::Terminal).unwrap().unwrap();
+        let given =
+            give(flight.path(), "1", Action::Land, None, OrderFrom::Terminal).unwrap().unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
         assert_eq!(mode(&folder), 0o700);
         assert_eq!(mode(&folder.join(STATION_FILE)), 0o600);
@@ -334,7 +335,8 @@ mod tests {
         assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
         let file = StationFile { schema: STATION_SCHEMA.to_owned(), station: "two".to_owned() };
         put(&elsewhere.path().join(STATION_FILE), &file).unwrap();
-        let error = give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap_err();
+        let error =
+            give(flight.path(), "1", Action::Return, None, OrderFrom::Terminal).unwrap_err();
         assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
     }
 
@@ -342,7 +344,7 @@ mod tests {
     fn what_is_no_order_is_not_carried_out() {
         let flight = tempfile::tempdir().unwrap();
         assert!(
-            give(flight.path(), "1", Action::Return, None, From::Terminal).unwrap().is_none(),
+            give(flight.path(), "1", Action::Return, None, OrderFrom::Terminal).unwrap().is_none(),
             "nobody is there"
         );
         let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();

@@ -21,7 +21,7 @@ use crate::base::time::GpsTime;
 use crate::fleet::abort::Action;
 use crate::fleet::messages::mode_name;
 use crate::fleet::order_handler::Notice;
-use crate::fleet::orders::{From, give};
+use crate::fleet::orders::{OrderFrom, give};
 use crate::fleet::preflight::{COLUMNS, Preflight};
 use crate::fleet::slots::{FleetTable, geodetic};
 use crate::fleet::telemetry::{Drone, Telemetry};
@@ -270,7 +270,7 @@ impl Station {
         if drones.as_ref().is_some_and(Vec::is_empty) {
             return Err(Refused::Nothing("no drone is chosen".to_owned()));
         }
-        match give(&self.folder, &name, action, drones, From::Page) {
+        match give(&self.folder, &name, action, drones, OrderFrom::Page) {
             Ok(Some(_)) => Ok(format!("{}: the order is given", word(action))),
             Ok(None) => Err(Refused::Failed(
                 "the station takes no orders: press Ctrl-C in its terminal, or use the remote \

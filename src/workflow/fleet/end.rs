@@ -12,7 +12,7 @@ use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::fleet::abort::{Aborted, Action};
 use crate::fleet::order_handler::{Notice, OrderHandler};
-use crate::fleet::orders::{From, Given, Inbox, give, has_station};
+use crate::fleet::orders::{Given, Inbox, OrderFrom, give, has_station};
 use crate::fleet::slots::FleetTable;
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -162,7 +162,7 @@ fn give_to(
     let drones = order.only.as_ref().map(|only| only.iter().copied().collect::<Vec<_>>());
     let mut given: Vec<(Given, &str)> = Vec::new();
     for (folder, flight) in flights {
-        match give(&folder.0, &name, order.action, drones.clone(), From::Terminal) {
+        match give(&folder.0, &name, order.action, drones.clone(), OrderFrom::Terminal) {
             Ok(taken) => given.extend(taken.map(|taken| (taken, flight.as_str()))),
             Err(error) => host
                 .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),

@@ -15,7 +15,7 @@ mod check;
 #[cfg(unix)]
 mod drones;
 mod effects;
-mod fleet;
+pub(crate) mod fleet;
 #[cfg(unix)]
 mod fleet_refusals;
 #[cfg(unix)]
@@ -27,7 +27,7 @@ mod gap;
 mod gap_firmware;
 mod gap_next;
 mod gap_nothing;
-mod guided;
+pub(crate) mod guided;
 mod help;
 mod indicators;
 mod inspect;

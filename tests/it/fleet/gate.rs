@@ -25,7 +25,7 @@ use updraft::fleet::guided::{Guided, GuidedFlight};
 use updraft::fleet::log_protocol::list::LogList;
 use updraft::fleet::messages::{GUIDED, LAND, RTL, ftp, param_set, set_mode, start_packet, text};
 use updraft::fleet::order_handler::{Notice, OrderHandler};
-use updraft::fleet::orders::{Inbox, give};
+use updraft::fleet::orders::{Inbox, OrderFrom, give};
 use updraft::fleet::params::ReadParams;
 use updraft::fleet::required::{CheckParams, requirements};
 use updraft::fleet::upload::Upload;
@@ -578,7 +578,7 @@ impl Observer for Orders<'_> {
     fn stop(&mut self, now: Micros) -> bool {
         if now >= self.at && !self.given {
             self.given = true;
-            give(self.folder, "1", Action::Return, Some(vec![drone(1)]), From::Terminal)
+            give(self.folder, "1", Action::Return, Some(vec![drone(1)]), OrderFrom::Terminal)
                 .unwrap()
                 .unwrap();
         }

@@ -1,7 +1,7 @@
 //! The page, its figures and tables, the terminal.
 
 mod browser;
-mod chromium;
+pub(crate) mod chromium;
 mod fields;
 mod gap;
 mod page;
