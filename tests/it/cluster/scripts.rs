@@ -179,15 +179,16 @@ fn a_script_runs_whatever_its_folder_is_called() {
     assert!(tab.err.contains("a tab or another control character"), "{tab}");
 }
 
+fn submit<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&["cluster", "submit"], more].concat()
+}
+
 #[test]
 fn a_folder_of_other_work_gets_no_job() {
     let bench = Bench::new();
     scheduler(&bench, &[("sbatch", "cat > /dev/null; echo 42"), ("squeue", "exit 0")]);
     fs::write(bench.path("small.toml"), SMALL).unwrap();
     bench.expect(0, &["sweep", "small.toml", "-o", "study", "-q"]);
-    fn submit<'a>(more: &[&'a str]) -> Vec<&'a str> {
-        [&["cluster", "submit"], more].concat()
-    }
     let seed = expect(&bench, 2, &submit(&["sweep", "small.toml", "--seed", "9", "-o", "study"]));
     assert!(seed.err.contains("study has items of other settings"), "{seed}");
     let blind = ["blind", "--seed", "20270101", "--flights", "3", "-o", "study", "--shards", "2"];

@@ -13,7 +13,7 @@ use updraft::live::server::{Server, Setup};
 use updraft::live::source::Source;
 use updraft::live::view::{DroneView, View};
 use updraft::mission::resolve::resolve;
-use updraft::workflow::clock::SystemClock;
+use updraft::workflow::clock::{Clock as _, SystemClock};
 
 /// A flight of the built-in hover, which counts how often it is looked at.
 struct Counted(AtomicU64);
@@ -90,7 +90,7 @@ fn wish(address: SocketAddr, headers: &str, body: &str) -> String {
 /// Reads a stream until this many events came.
 fn events(stream: &mut TcpStream, count: usize) -> String {
     let mut text = String::new();
-    let mut piece = [0; 65536];
+    let mut piece = vec![0; 65536];
     while text.matches("\n\n").count() < count {
         let read = stream.read(&mut piece).unwrap();
         assert!(read > 0, "the stream ended: {text}");
@@ -196,7 +196,6 @@ fn pages_that_hang_are_dropped_and_the_station_is_looked_at_only_while_somebody_
     let mut slow = connect(server.address());
     slow.write_all(b"GET / HTTP/1.1\r\nA:").unwrap();
     let begun = SystemClock::start();
-    use updraft::workflow::clock::Clock as _;
     // Others are served as if nothing was.
     for _ in 0..20 {
         assert!(get(server.address(), "/", "").starts_with("HTTP/1.1 200 "));
