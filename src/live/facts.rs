@@ -1,4 +1,4 @@
-//! What does not change while a flight is looked at.
+//! Facts that do not change while a flight is looked at.
 
 use std::collections::BTreeMap;
 
@@ -86,7 +86,7 @@ impl Facts {
         }
     }
 
-    /// The same for a page of a rank.
+    /// Facts as a page of this rank is told them.
     #[must_use]
     pub fn seen_by(mut self, rank: Rank) -> Self {
         self.may_order = rank == Rank::Operator;

@@ -1,4 +1,4 @@
-//! What has changed since a page's last look.
+//! Differences between a page's last look and the present one.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -70,7 +70,8 @@ impl Looks {
         }
     }
 
-    /// What is new since look `seen` of which `drones` were listed and this was the last word; `None`: everything.
+    /// News since a look, for a page that knows of that look, of so many drones and of words up to a number; `None`: it knows
+    /// nothing.
     pub fn since(&self, seen: Option<(u64, usize, u64)>) -> Frame<'_> {
         let view = &self.view;
         let (seen, listed, word) = seen.unwrap_or((0, 0, 0));
@@ -94,7 +95,7 @@ impl Looks {
         }
     }
 
-    /// What a page knows that has been sent this look.
+    /// Knowledge of a page that has been sent this look: its number, the drones, and the last word.
     pub fn sent(&self, before: Option<(u64, usize, u64)>) -> (u64, usize, u64) {
         let word = before.map_or(0, |(.., word)| word);
         let last = self.view.said.last().map_or(word, |said| said.number.max(word));

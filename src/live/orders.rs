@@ -1,4 +1,4 @@
-//! What a page may ask for.
+//! Wishes of pages.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -12,7 +12,7 @@ use crate::link::id::DroneId;
 pub enum Wish {
     /// Drones are to return, or to land.
     Order {
-        /// What they are to do.
+        /// Action that ends their flight.
         action: Action,
         /// Who; absent: all.
         #[serde(default)]
@@ -39,7 +39,7 @@ pub enum Wish {
     },
 }
 
-/// Why a wish is not carried out.
+/// Reason why a wish is not carried out.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Refused {
     /// The page may look only.
@@ -55,5 +55,5 @@ pub enum Refused {
     Failed(String),
 }
 
-/// What is said to a wish.
+/// Answer to a wish: words for people.
 pub type Said = Result<String, Refused>;

@@ -10,7 +10,7 @@ use super::view::{AirMap, AirView, DroneView, Level, Replay, Said, Step, View};
 use crate::link::clock::{Clock, Micros};
 use crate::mission::Plan;
 use crate::protocol::show::Stage;
-use crate::show::trajectory::Cursor;
+use crate::show::trajectory::{Cursor, Trajectory};
 
 /// Slowest and fastest replay.
 pub const SPEEDS: [f64; 2] = [0.1, 60.0];
@@ -76,7 +76,8 @@ impl FleetAir {
 pub struct Player {
     plan: Plan,
     clock: Arc<dyn Clock>,
-    tracks: Vec<Track>,
+    /// Tracks by slot, each with what was planned.
+    tracks: Vec<(Track, Trajectory)>,
     air: Option<FleetAir>,
     ends_s: [f64; 2],
     state: Mutex<Playing>,
@@ -118,6 +119,12 @@ impl Player {
             at_s: ends_s[0],
             since: clock.now(),
         };
+        let planned = |track: Track| {
+            let slot = plan.slot(track.slot);
+            let trajectory = slot.map(|slot| plan.trajectory(slot)).unwrap_or_default();
+            (track, trajectory)
+        };
+        let tracks = tracks.into_iter().map(planned).collect();
         Self { plan: plan.clone(), clock, tracks, air, ends_s, state: Mutex::new(state) }
     }
 
@@ -158,7 +165,7 @@ impl Track {
         (index >= 0.0).then(|| values.get(index as usize).copied().flatten())?
     }
 
-    fn view(&self, plan: &Plan, time_s: f64) -> DroneView {
+    fn view(&self, planned: &Trajectory, time_s: f64) -> DroneView {
         let armed = self.armed_s.iter().any(|(from, to)| (*from..=*to).contains(&time_s));
         let stage = self.stages.iter().take_while(|(from, _)| *from <= time_s).last();
         let stage = stage.map_or_else(
@@ -166,14 +173,13 @@ impl Track {
             |(_, number)| Stage::from_number(*number).to_string(),
         );
         let place_m = self.place(time_s);
-        let planned = plan.slot(self.slot).filter(|_| armed).map(|slot| {
-            let trajectory = plan.trajectory(slot);
-            let mut at = Cursor::new(&trajectory).state_at(time_s).position_m;
-            at.z -= slot.home_m[2];
+        let wanted = armed.then(|| {
+            let mut at = Cursor::new(planned).state_at(time_s).position_m;
+            at.z -= planned.start_m.z;
             at
         });
-        let distance_m = place_m.zip(planned).map(|(place, planned)| {
-            (0..3).map(|i| (place[i] - planned[i]).powi(2)).sum::<f64>().sqrt()
+        let distance_m = place_m.zip(wanted).map(|(place, wanted)| {
+            (0..3).map(|i| (place[i] - wanted[i]).powi(2)).sum::<f64>().sqrt()
         });
         let ended = time_s > self.first_s + self.step_s * self.place_m.len() as f64;
         let (level, trouble) = match distance_m {
@@ -211,9 +217,9 @@ impl Source for Player {
         let state = self.advance();
         let mut tracks = self.tracks.iter().peekable();
         let drones = self.plan.slots.iter().map(|slot| {
-            while tracks.next_if(|track| track.slot < slot.slot).is_some() {}
-            match tracks.next_if(|track| track.slot == slot.slot) {
-                Some(track) => track.view(&self.plan, state.at_s),
+            while tracks.next_if(|track| track.0.slot < slot.slot).is_some() {}
+            match tracks.next_if(|track| track.0.slot == slot.slot) {
+                Some((track, planned)) => track.view(planned, state.at_s),
                 None => DroneView {
                     slot: Some(slot.slot),
                     stage: "no log".to_owned(),
@@ -224,7 +230,7 @@ impl Source for Player {
             }
         });
         let drones = drones.collect();
-        let doubts = self.tracks.iter().flat_map(|track| {
+        let doubts = self.tracks.iter().flat_map(|(track, _)| {
             track.doubts.iter().map(|doubt| format!("slot {}: {doubt}", track.slot))
         });
         let said = doubts.zip(1..).map(|(text, number)| Said {

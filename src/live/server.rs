@@ -40,7 +40,7 @@ const RETRY_MS: u32 = 1000;
 /// Source of random bytes.
 pub type Random = dyn Fn(&mut [u8]) -> io::Result<()> + Send + Sync;
 
-/// What a server needs.
+/// Setup of a server.
 pub struct Setup {
     /// Flight that is looked at.
     pub source: Arc<dyn Source>,

@@ -1,4 +1,4 @@
-//! What a page looks at.
+//! Flights that pages look at.
 
 use super::facts::Facts;
 use super::http::guard::Rank;
@@ -7,7 +7,7 @@ use super::view::View;
 
 /// A flight that can be looked at, by several threads.
 pub trait Source: Send + Sync {
-    /// What does not change: plan, fence, trajectories.
+    /// Facts that do not change: plan, fence, trajectories.
     fn facts(&self) -> Facts;
 
     /// The flight now; `now_ms`: time of the station, ms since 1970.

@@ -466,11 +466,18 @@ impl Station {
         if view.words.is_empty()
             && let Some(text) = state.texts.back()
             && at < text.at + TEXT_SHOWN
+            && !(text.text.starts_with("PreArm: ") && is_ready(state))
         {
             view.words.clone_from(&text.text);
         }
         view
     }
+}
+
+/// Whether nothing stands in the way of arming any more, whatever was said before.
+fn is_ready(state: &Drone) -> bool {
+    let passes = state.health.and_then(|(_, health)| health.prearm_ok) == Some(true);
+    passes || state.is_armed() == Some(true)
 }
 
 /// Stage of the show, or flight mode.

@@ -11,14 +11,14 @@ const LOSSY_PERCENT: f64 = 20.0;
 /// Fewest satellites that are enough.
 const SATELLITES: u8 = 6;
 
-/// What is looked at.
+/// State of a drone that is judged.
 #[derive(Clone, Copy, Debug)]
 pub struct Looked<'a> {
     /// Time, us.
     pub now: Micros,
     /// The drone, if it was ever heard.
     pub drone: Option<&'a Drone>,
-    /// Its flight, if it is watched.
+    /// Flight of the drone, if it is watched.
     pub flying: Option<Flying>,
     /// Limits of the watch.
     pub limits: &'a Limits,

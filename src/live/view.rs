@@ -1,4 +1,4 @@
-//! What a page shows at one moment, in its words.
+//! Words of the page: a flight at one moment.
 
 use schemars::JsonSchema;
 use serde::Serialize;

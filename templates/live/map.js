@@ -102,7 +102,7 @@ function drawMap() {
 function drawPlan(most, isFlying) {
   const { pen, width, height } = prepare("plan");
   const { facts } = state;
-  const pad = 26;
+  const pad = 36;
   const span = [bounds.x[1] - bounds.x[0], bounds.y[1] - bounds.y[0]].map((length) => Math.max(length, 4));
   const scale = Math.min((width - 2 * pad) / span[1], (height - 2 * pad) / span[0]);
   const middle = [(bounds.x[0] + bounds.x[1]) / 2, (bounds.y[0] + bounds.y[1]) / 2];
@@ -178,7 +178,7 @@ function drawPlan(most, isFlying) {
 function drawNorth(pen, width) {
   const angle = -state.facts.orientation_deg * Math.PI / 180;
   pen.save();
-  pen.translate(width - 26, 30);
+  pen.translate(width - 20, 34);
   pen.rotate(angle);
   pen.fillStyle = colour("--ink");
   pen.beginPath();
@@ -188,7 +188,7 @@ function drawNorth(pen, width) {
   pen.restore();
   pen.textAlign = "center";
   pen.fillStyle = colour("--ink");
-  pen.fillText("N", width - 26 + 23 * Math.sin(angle), 34 - 23 * Math.cos(angle));
+  pen.fillText("N", width - 20 + 22 * Math.sin(angle), 38 - 22 * Math.cos(angle));
 }
 
 function drawSide(most, isFlying) {

@@ -11,7 +11,7 @@ use sha2::{Digest as _, Sha256};
 use super::request::{Method, Request};
 use super::response::Status;
 
-/// What a page may do.
+/// Rank of a page, by what it may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Rank {
     /// It may look.

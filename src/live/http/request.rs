@@ -10,19 +10,19 @@ pub const MOST_BODY_BYTES: usize = 4 << 10;
 /// Most headers.
 const MOST_HEADERS: usize = 64;
 
-/// What is asked.
+/// Method of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// GET.
+    /// Request to read (GET).
     Get,
-    /// POST.
+    /// Request that does something (POST).
     Post,
 }
 
 /// A whole request. Header values are as they came, without anything that acts on a terminal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// What is asked.
+    /// Method of the request.
     pub method: Method,
     /// Path, without the query.
     pub path: String,
@@ -36,7 +36,7 @@ pub struct Request {
     pub fetch_site: Option<String>,
     /// `X-Token`.
     pub token: Option<String>,
-    /// Body.
+    /// Body of the request; empty: it has none.
     pub body: Vec<u8>,
 }
 

@@ -49,11 +49,11 @@ pub enum Kind<'a> {
         /// Nonce of this answer alone.
         nonce: &'a str,
     },
-    /// JSON.
+    /// Answer in JSON.
     Json,
     /// Events that go on.
     Events,
-    /// Plain text.
+    /// Answer in plain text.
     Text,
     /// The small picture in the browser's tab.
     Picture,

@@ -241,7 +241,10 @@ fn air_of(analysed: &FlightAnalysis, slot: u16) -> Option<(i64, Vec<Option<[f32;
 fn fleet_air(analysed: &FlightAnalysis) -> Option<FleetAir> {
     /// Half the width of the 95 % interval, standard errors.
     const WIDTH: f64 = 1.96;
-    let posterior = analysed.map.as_ref()?.posterior.as_ref()?;
+    let Some(posterior) = analysed.map.as_ref()?.posterior.as_ref() else {
+        let note = "From the logs: the colours are each drone's own estimate at this time";
+        return Some(FleetAir { note: note.to_owned(), ..FleetAir::default() });
+    };
     let fleet = posterior.fleet;
     Some(FleetAir {
         fleet_mps: fleet.map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se]),

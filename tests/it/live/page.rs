@@ -135,9 +135,8 @@ fn a_page_finds_its_station_again_and_fits_a_phone() {
 fn a_replay_plays_jumps_and_shows_the_air() {
     let Some(mut browser) = Browser::start() else { return };
     let bench = Bench::new();
-    let run =
-        ["run", "--grid", "2x2", "--duration", "60", "--updraft", "0.6", "-o", "campaign", "-q"];
-    bench.expect(0, &run);
+    let run = ["run", "--grid", "2x2", "--duration", "60", "-o", "campaign", "-q"];
+    bench.expect(0, &[&run[..], &["--air", "still", "--updraft", "0.6"]].concat());
     let live = free_port();
     let args = ["live", "campaign", "--flight", "hover", "--speed", "30", "--listen", &live];
     let mut flight = Flight::of(&bench, &args);
