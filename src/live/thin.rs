@@ -58,6 +58,8 @@ struct Channels {
     pulse_min: Channel,
     roll: Channel,
     pitch: Channel,
+    voltage: Channel,
+    current: Channel,
     restarts: u32,
 }
 
@@ -114,6 +116,15 @@ impl Thin {
                         .push(time_s, pulses.iter().copied().fold(f64::MAX, f64::min));
                 }
             }
+            MavMessage::SYS_STATUS(_) => {
+                // It has no time of the board's: that of its arrival is near enough for a battery.
+                let Some((at, health)) = of.health else { return };
+                let Some(time_s) = of.clock.gps_ms(at).map(|ms| ms / 1000.0) else { return };
+                if let (Some(volts), Some(amps)) = (health.battery_v, health.battery_a) {
+                    channels.voltage.push(time_s, volts);
+                    channels.current.push(time_s, amps);
+                }
+            }
             _ => {}
         }
     }
@@ -142,6 +153,8 @@ impl Thin {
             pulse_min_us: series(&channels.pulse_min),
             roll_rad: series(&channels.roll),
             pitch_rad: series(&channels.pitch),
+            voltage_v: Some(series(&channels.voltage)).filter(|series| !series.is_empty()),
+            current_a: Some(series(&channels.current)).filter(|series| !series.is_empty()),
             pulse_limits_us: LIMITS_US,
             ..Flight::default()
         })

@@ -84,6 +84,8 @@ pub struct Health {
     pub prearm_ok: Option<bool>,
     /// Battery voltage, V, if measured.
     pub battery_v: Option<f64>,
+    /// Battery current, A, if measured.
+    pub battery_a: Option<f64>,
     /// Charge left, %, if known.
     pub battery_percent: Option<u8>,
 }
@@ -352,6 +354,7 @@ fn health(status: &dialect::SYS_STATUS_DATA) -> Health {
     Health {
         prearm_ok: known.then(|| status.onboard_control_sensors_health.contains(prearm)),
         battery_v: (status.voltage_battery != u16::MAX).then_some(volts),
+        battery_a: (status.current_battery >= 0).then(|| f64::from(status.current_battery) / 100.0),
         battery_percent: u8::try_from(status.battery_remaining).ok().filter(|left| *left <= 100),
     }
 }

@@ -18,6 +18,7 @@ use crate::live::station::Station;
 use crate::live::view::{AirMap, AirView, Step};
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
+use crate::numeric;
 use crate::workflow::analyze::Settings;
 use crate::workflow::analyze::one_input;
 use crate::workflow::clock::{Clock, Micros, S};
@@ -147,6 +148,13 @@ fn calibration(path: &Path) -> Result<Option<FlightAnalysis>, WorkflowError> {
     Ok(analysis.flights.into_iter().find(usable))
 }
 
+/// Resistance of the battery that flew a slot in the calibration, ohm: the mean over its windows.
+fn resistance_ohm(reference: &FlightAnalysis, slot: u16) -> Option<f64> {
+    let drone = reference.drones.iter().find(|drone| drone.slot == Some(slot))?;
+    let supplies = drone.windows.iter().filter_map(|window| window.supply.as_ref());
+    numeric::mean(supplies.map(|supply| supply.resistance_ohm))
+}
+
 /// Show times of the flight's hover, s.
 fn hover_s(plan: &Plan) -> Option<[f64; 2]> {
     let segments = plan.groups.iter().flat_map(|group| &group.segments);
@@ -178,7 +186,10 @@ fn watch(
         };
         let begun = clock.now();
         let from_s = (show_s - WINDOW_S).max(begins_s);
-        let logs = station.flights(from_s).unwrap_or_default().into_iter().map(|(slot, flight)| {
+        let flights = station.flights(from_s).unwrap_or_default();
+        let logs = flights.into_iter().map(|(slot, mut flight)| {
+            // No message has it, and packs keep theirs.
+            flight.resistance_ohm = resistance_ohm(reference, slot);
             LogInput {
                 slot: Some(slot),
                 path: flight.source.clone(),
