@@ -229,7 +229,10 @@ fn shown(
         let errors = if together { &drone.posterior_sd_mps } else { &drone.sd_mps };
         let last = values.iter().enumerate().rev().find_map(|(at, value)| Some((at, (*value)?)));
         if let (Some(slot), Some((at, value))) = (drone.slot, last) {
-            let error = errors.get(at).copied().flatten().unwrap_or(drone.mean.se);
+            // Alone, its interval has all origins of error; what scatters is only one of them.
+            let interval = drone.interval_mps.get(at).copied().flatten().filter(|_| !together);
+            let whole = interval.map(|[low, high]| (high - low) / (2.0 * WIDTH));
+            let error = whole.or(errors.get(at).copied().flatten()).unwrap_or(drone.mean.se);
             of.insert(slot, (value, error));
             latest_s = latest_s.max(map.time_s.get(at).copied().unwrap_or(latest_s));
         }
