@@ -234,6 +234,16 @@ mod tests {
         assert_eq!(task("6").unwrap(), Shard::new(2, 3).unwrap());
     }
 
+    #[test]
+    fn the_first_shard_begins_with_the_first_item() {
+        let items = |text: &str| {
+            let shard: Shard = text.parse().unwrap();
+            (0..7).filter(|item| shard.takes(*item)).collect::<Vec<_>>()
+        };
+        assert_eq!(items("1/3"), [0, 3, 6]);
+        assert_eq!(items("3/3"), [2, 5]);
+    }
+
     proptest! {
         #[test]
         fn every_item_has_one_shard(items in 0_usize..500, of in 1_u64..60) {
