@@ -38,7 +38,8 @@ fn a_flight_is_started_and_ended_on_its_page() {
     let Some(mut browser) = Browser::start() else { return };
     let (bench, _fleet, link) = stage_on(Bench::new(), &["--speed", "5"]);
     let live = free_port();
-    let mut flight = Flight::of(&bench, &flown(&link, &live, "60"));
+    // Half a minute on the wall: a busy machine opens two pages in it.
+    let mut flight = Flight::of(&bench, &flown(&link, &live, "150"));
     flight.hear("Live page, to give orders");
     let (look, order) = {
         let said = flight.said();
