@@ -84,10 +84,7 @@ pub fn run(
                 }
                 None => one(draw, *index, place, made_by, explain, stop),
             };
-            if matches!(
-                &result,
-                Err(BlindError::File(_) | BlindError::Campaign(CampaignError::File(_)))
-            ) {
+            if result.as_ref().is_err_and(is_of_file) {
                 is_unwritable.store(true, Ordering::Relaxed);
             }
             done();
@@ -98,13 +95,15 @@ pub fn run(
         return Err(BlindError::Stopped);
     }
     if is_unwritable.load(Ordering::Relaxed) {
-        let is_file = |error: &BlindError| {
-            matches!(error, BlindError::File(_) | BlindError::Campaign(CampaignError::File(_)))
-        };
-        let first = taken.into_iter().filter_map(|taken| taken.result.err()).find(is_file);
+        let first = taken.into_iter().filter_map(|taken| taken.result.err()).find(is_of_file);
         return Err(first.unwrap_or(BlindError::Stopped));
     }
     Ok(taken)
+}
+
+/// Whether a file could not be read or written.
+fn is_of_file(error: &BlindError) -> bool {
+    matches!(error, BlindError::File(_) | BlindError::Campaign(CampaignError::File(_)))
 }
 
 /// A flight of a table after a run, with its result or without.

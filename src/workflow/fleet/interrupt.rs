@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use crate::fleet::abort::Action;
 use crate::link::clock::{Micros, S};
-use crate::workflow::host::{Answer, Host};
+use crate::workflow::host::{Answer, Host, News};
 
 /// Nobody who answers within this: the choice of `--on-interrupt` is taken.
 const ANSWER_WITHIN: Micros = 15 * S;
@@ -90,6 +90,9 @@ impl<'a> Interrupt<'a> {
     pub(crate) fn poll(&mut self, now: Micros) -> Option<Choice> {
         if self.chosen.is_none() && self.host.check_stop().is_err() {
             self.chosen = self.choose(now);
+            if self.chosen.is_some() {
+                self.host.news(&News::Answered);
+            }
         }
         self.chosen
     }

@@ -172,7 +172,9 @@ pub(crate) fn asked(
                 let answer = answer.map_err(failed)?.unwrap_or_default();
                 return Ok(answer.trim().eq_ignore_ascii_case("yes"));
             }
-            Err(RecvTimeoutError::Timeout) => meanwhile()?,
+            Err(RecvTimeoutError::Timeout) => {
+                meanwhile().inspect_err(|_| host.news(&News::Answered))?;
+            }
             Err(RecvTimeoutError::Disconnected) => return Ok(false),
         }
     }

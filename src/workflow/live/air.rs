@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::of_map;
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::analysis::{AtHand, LogInput, analyze_flight};
 use crate::base::plain::Shown as _;
 use crate::campaign::read_json;
-use crate::live::facts::centi;
 use crate::live::station::Station;
-use crate::live::view::{AirMap, AirView, Step};
+use crate::live::view::{AirView, Step};
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric;
@@ -36,8 +36,6 @@ const CLOSEST: Micros = 4 * S;
 const SHARE: u32 = 19;
 /// Motors of a vehicle, on its first outputs: all that updraft knows have four.
 const MOTORS: usize = 4;
-/// Half the width of the 95 % interval, standard errors.
-const WIDTH: f64 = 1.96;
 
 /// What the air is told with.
 #[derive(Clone, Debug)]
@@ -224,37 +222,19 @@ fn shown(
     let mut of = BTreeMap::new();
     let mut latest_s = from_s;
     for drone in &map.drones {
-        let together = !drone.posterior_mps.is_empty();
-        let values = if together { &drone.posterior_mps } else { &drone.updraft_mps };
-        let errors = if together { &drone.posterior_sd_mps } else { &drone.sd_mps };
-        let last = values.iter().enumerate().rev().find_map(|(at, value)| Some((at, (*value)?)));
-        if let (Some(slot), Some((at, value))) = (drone.slot, last) {
-            // Alone, its interval has all origins of error; what scatters is only one of them.
-            let interval = drone.interval_mps.get(at).copied().flatten().filter(|_| !together);
-            let whole = interval.map(|[low, high]| (high - low) / (2.0 * WIDTH));
-            let error = whole.or(errors.get(at).copied().flatten()).unwrap_or(drone.mean.se);
+        let last = of_map::values(drone).enumerate().rev().find_map(|(at, of)| Some((at, of?)));
+        if let (Some(slot), Some((at, (value, error)))) = (drone.slot, last) {
             of.insert(slot, (value, error));
             latest_s = latest_s.max(map.time_s.get(at).copied().unwrap_or(latest_s));
         }
     }
     let posterior = map.posterior.as_ref();
-    let fleet = posterior.and_then(|posterior| posterior.fleet);
-    let grid = posterior.and_then(|posterior| posterior.grid.as_ref()).and_then(|grid| {
-        let (x, y) = (grid.x_m.first()?, grid.y_m.first()?);
-        let values = grid.updraft_mps.last()?;
-        Some(AirMap {
-            origin_m: [*x, *y],
-            step_m: grid.x_m.get(1).map_or(1.0, |next| next - x),
-            columns: grid.x_m.len(),
-            values_mps: values.iter().flatten().map(|value| value.map(centi)).collect(),
-        })
-    });
+    let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
     let view = AirView {
         provisional: true,
         time_s: latest_s,
-        fleet_mps: fleet
-            .map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se].map(centi)),
-        map: grid,
+        fleet_mps: posterior.and_then(|posterior| posterior.fleet).map(of_map::interval_mps),
+        map: grid.and_then(|grid| of_map::maps(grid).next_back()).map(|(_, map)| map),
         note: format!(
             "From telemetry at {rate_hz:.1} Hz: the mean is over the last {:.0} s, the colours are 10 s means. \
              The logs tell it again, and better.",

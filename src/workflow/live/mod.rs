@@ -2,6 +2,7 @@
 
 mod air;
 mod host;
+mod of_map;
 mod replay;
 mod serve;
 

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::of_map;
 use super::serve::{LiveWish, Served, serve};
-use crate::analysis::result::{Analysis, FlightAnalysis, PosteriorGrid};
+use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::slots::whose_logs;
 use crate::analysis::{FlightInput, LogInput};
 use crate::base::causes::with_causes;
@@ -15,10 +16,8 @@ use crate::base::plain::Shown as _;
 use crate::campaign::origin::{self, LogOrigin};
 use crate::campaign::{self, read_json};
 use crate::flight::{Flight, FlightOptions, Series};
-use crate::live::facts::centi;
 use crate::live::player::{FleetAir, Player, Track};
 use crate::live::source::Source;
-use crate::live::view::AirMap;
 use crate::mission::Plan;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work, find};
@@ -225,44 +224,22 @@ fn air_of(analysed: &FlightAnalysis, slot: u16) -> Option<(i64, Vec<Option<[f32;
     let map = analysed.map.as_ref()?;
     let drone = map.drones.iter().find(|drone| drone.slot == Some(slot))?;
     let first_s = map.time_s.first()?.round() as i64;
-    let (values, errors) = if drone.posterior_mps.is_empty() {
-        (&drone.updraft_mps, &drone.sd_mps)
-    } else {
-        (&drone.posterior_mps, &drone.posterior_sd_mps)
-    };
-    let value = |(index, value): (usize, &Option<f64>)| {
-        let error = errors.get(index).copied().flatten().unwrap_or(f64::NAN);
-        value.map(|value| [value as f32, error as f32])
-    };
-    Some((first_s, values.iter().enumerate().map(value).collect()))
+    let value =
+        |value: Option<(f64, f64)>| value.map(|(value, error)| [value as f32, error as f32]);
+    Some((first_s, of_map::values(drone).map(value).collect()))
 }
 
 /// Mean over fleet and hover, and maps between the drones.
 fn fleet_air(analysed: &FlightAnalysis) -> Option<FleetAir> {
-    /// Half the width of the 95 % interval, standard errors.
-    const WIDTH: f64 = 1.96;
     let Some(posterior) = analysed.map.as_ref()?.posterior.as_ref() else {
         let note = "From the logs: the colours are each drone's own estimate at this time";
         return Some(FleetAir { note: note.to_owned(), ..FleetAir::default() });
     };
-    let fleet = posterior.fleet;
+    let grid = posterior.grid.as_ref();
     Some(FleetAir {
-        fleet_mps: fleet.map(|of| [of.value, of.value - WIDTH * of.se, of.value + WIDTH * of.se]),
-        maps: posterior.grid.as_ref().map(maps).unwrap_or_default(),
+        fleet_mps: posterior.fleet.map(of_map::interval_mps),
+        maps: grid.map(|grid| of_map::maps(grid).collect()).unwrap_or_default(),
         note: "From the logs: the mean is over the whole hover, the colours are the posterior at this time"
             .to_owned(),
     })
-}
-
-/// Maps by their times.
-fn maps(grid: &PosteriorGrid) -> Vec<(f64, AirMap)> {
-    let (Some(x), Some(y)) = (grid.x_m.first(), grid.y_m.first()) else { return Vec::new() };
-    let step_m = grid.x_m.get(1).map_or(1.0, |next| next - x);
-    let map = |values: &Vec<Vec<Option<f64>>>| AirMap {
-        origin_m: [*x, *y],
-        step_m,
-        columns: grid.x_m.len(),
-        values_mps: values.iter().flatten().map(|value| value.map(centi)).collect(),
-    };
-    grid.time_s.iter().copied().zip(grid.updraft_mps.iter().map(map)).collect()
 }
