@@ -18,6 +18,7 @@ mod gap;
 mod house;
 mod live;
 mod mission;
+mod ports;
 mod report;
 mod skybrush_server;
 mod statistics;

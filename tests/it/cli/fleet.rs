@@ -19,8 +19,7 @@ impl Drop for Fleet {
 }
 
 pub(crate) fn free_port() -> String {
-    let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
-    format!("127.0.0.1:{}", socket.local_addr().unwrap().port())
+    crate::ports::free_port().to_string()
 }
 
 impl Bench {

@@ -22,6 +22,7 @@ use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
 
 use super::support::{Field, file, gps_at, ladder, log_of, read, show_of, tow_at};
+use crate::ports::free_port;
 
 fn slot_m(system: u8) -> [f64; 2] {
     let index = u32::from(system - 1);
@@ -36,10 +37,6 @@ pub(crate) fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> V
     let mut storage = MemoryStorage::default();
     storage.put(SHOW_FILE, file(show)).unwrap();
     VirtualVehicle::new(world, setup, Box::new(storage), 0)
-}
-
-pub(crate) fn free_port() -> SocketAddr {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
 }
 
 /// Waits for all, tells them where and when, and waits until all have landed; the start's second.

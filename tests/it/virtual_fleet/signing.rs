@@ -13,8 +13,9 @@ use updraft::link::station::{STATION, Setup, Station};
 use updraft::virtual_fleet::lossy::Faults;
 use updraft::virtual_fleet::server::{Pace, Running, ServerError, ServerOptions, serve};
 
-use super::server::{drone, free_port};
+use super::server::drone;
 use super::support::{Field, show_of};
+use crate::ports::free_port;
 
 fn key(byte: u8) -> Key {
     Key::from_bytes([byte; 32])
