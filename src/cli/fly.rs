@@ -16,7 +16,7 @@ use crate::live::tap::Tap;
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::end::order_handler;
 use crate::workflow::fleet::fly::{FlyWish, fly, readable};
-use crate::workflow::fleet::output::{FlightOutput, FlyOutput};
+use crate::workflow::fleet::output::{FlightOutput, FlyOutput, LogOutput};
 use crate::workflow::fleet::server::fly as fly_through;
 use crate::workflow::fleet::start::needs_person;
 use crate::workflow::fleet::{lock, one_flight, rehearse};
@@ -142,7 +142,7 @@ fn fly_target(
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             readable(&folder)?;
             let mut station = args.connect.open(context, links)?;
-            let live = args.live.open(context, &args.campaign, &folder, &plan)?;
+            let mut live = args.live.open(context, &args.campaign, &folder, &plan)?;
             let host = LiveHost::new(context, live.station.clone(), live.orders);
             let mut tap = Tap::new(&mut station, live.station.clone());
             let mut handler = order_handler(&host, &mut tap, &folder);
@@ -150,6 +150,9 @@ fn fly_target(
             crew.is_guided = args.guided;
             let flown = crew.listen(args.connect.wait).and_then(|()| fly(&host, &mut crew, &wish));
             let (flight, ending) = crew.ending(flown)?;
+            if !flight.logs.iter().all(LogOutput::is_missing) {
+                live.show_logs(&host);
+            }
             Ok((vec![flight], ending.into()))
         }
         Target::Sim => {

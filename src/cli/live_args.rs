@@ -14,6 +14,7 @@ use crate::campaign::FlightFolder;
 use crate::live::source::Source;
 use crate::live::station::Station;
 use crate::mission::Plan;
+use crate::workflow::host::Host;
 use crate::workflow::live::{Address, AirWatch, AirWish, LiveWish, Served, serve};
 
 /// How a page is served.
@@ -39,13 +40,22 @@ pub(super) struct Live {
     pub(super) station: Option<Arc<Station>>,
     /// Whether it may order.
     pub(super) orders: bool,
-    _air: Option<AirWatch>,
+    air: Option<AirWatch>,
     _served: Option<Served>,
 }
 
 /// Random bytes of the operating system.
 pub(super) fn random(bytes: &mut [u8]) -> io::Result<()> {
     SysRng.try_fill_bytes(bytes).map_err(io::Error::other)
+}
+
+impl Live {
+    /// The logs of the flight are home: the page shows what they say of the air.
+    pub(super) fn show_logs(&mut self, host: &dyn Host) {
+        if let Some(air) = &mut self.air {
+            air.show_logs(host);
+        }
+    }
 }
 
 impl LiveArgs {
@@ -66,21 +76,20 @@ impl LiveArgs {
         plan: &Plan,
     ) -> Result<Live, CommandError> {
         let Some(address) = self.live else {
-            return Ok(Live { station: None, orders: false, _air: None, _served: None });
+            return Ok(Live { station: None, orders: false, air: None, _served: None });
         };
         let clock = Arc::clone(context.clock());
         let station = Arc::new(Station::new(plan, folder.0.clone(), clock));
         let wish = LiveWish { address, orders: self.live_orders, random };
-        let wish_of_air = AirWish { campaign: campaign.to_owned(), law: self.law.clone() };
+        let wish_of_air = AirWish {
+            campaign: campaign.to_owned(),
+            folder: folder.clone(),
+            law: self.law.clone(),
+        };
         let air = AirWatch::begin(context, &station, plan, &wish_of_air)?;
         let source = Arc::clone(&station);
         let source: Arc<dyn Source> = source;
         let served = serve(context, &folder.0, &source, &wish)?;
-        Ok(Live {
-            station: Some(station),
-            orders: self.live_orders,
-            _air: air,
-            _served: Some(served),
-        })
+        Ok(Live { station: Some(station), orders: self.live_orders, air, _served: Some(served) })
     }
 }

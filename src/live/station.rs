@@ -33,6 +33,7 @@ use crate::link::id::DroneId;
 use crate::link::net::Received;
 use crate::mission::Plan;
 use crate::protocol::show::Stage;
+use crate::virtual_fleet::vehicle::REVISION;
 
 /// Sentences that are kept.
 const MOST_SAID: usize = 300;
@@ -153,6 +154,14 @@ impl Station {
         let (start, thin) = (GpsTime::from_total_ms(now.start_gps_ms?)?, now.thin.as_ref()?);
         let flight = |(drone, slot)| Some((slot, thin.flight(drone, start, from_s)?));
         Some(now.monitor.slots().filter_map(flight).collect())
+    }
+
+    /// Whether these are virtual drones of our own, by what they say of their firmware.
+    pub fn are_virtual(&self) -> bool {
+        let now = self.lock();
+        let version = |drone| now.monitor.telemetry.get(drone)?.version;
+        let versions = now.monitor.slots().filter_map(|(drone, _)| version(drone));
+        versions.map(|version| version.revision == REVISION).reduce(|a, b| a && b) == Some(true)
     }
 
     /// Step of the station, and the time of the show, s.

@@ -30,6 +30,8 @@ pub struct Version {
     pub show: bool,
     /// Version number: major, minor, patch.
     pub number: [u8; 3],
+    /// Revision of its sources, as the vehicle states it; zeros: not stated.
+    pub revision: [u8; 8],
 }
 
 impl std::fmt::Display for Version {
@@ -267,7 +269,9 @@ impl Drone {
             MavMessage::AUTOPILOT_VERSION(version) => {
                 let [_, patch, minor, major] = version.flight_sw_version.to_le_bytes();
                 let show = version.capabilities.bits() & CAPABILITY != 0;
-                self.version = Some(Version { show, number: [major, minor, patch] });
+                let number = [major, minor, patch];
+                let revision = version.flight_custom_version;
+                self.version = Some(Version { show, number, revision });
             }
             _ => {}
         }
@@ -443,10 +447,12 @@ mod tests {
         assert_eq!(drone.has_show_firmware(), None);
         let mut version = dialect::AUTOPILOT_VERSION_DATA {
             flight_sw_version: u32::from_be_bytes([4, 6, 1, 255]),
+            flight_custom_version: *b"0123abcd",
             ..Default::default()
         };
         drone.on_message(1, &MavMessage::AUTOPILOT_VERSION(version.clone()));
         assert_eq!(drone.version.unwrap().to_string(), "stock 4.6.1");
+        assert_eq!(drone.version.unwrap().revision, *b"0123abcd");
         assert_eq!(drone.has_show_firmware(), Some(false));
         version.capabilities = dialect::MavProtocolCapability::from_bits_retain(CAPABILITY);
         drone.on_message(1, &MavMessage::AUTOPILOT_VERSION(version));

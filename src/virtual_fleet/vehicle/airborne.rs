@@ -52,7 +52,7 @@ impl<'w> Airborne<'w> {
     }
 
     pub(super) fn battery(&self) -> Option<BatteryReading> {
-        self.flight.flight.battery()
+        self.flight.battery()
     }
 
     pub(super) fn miss_m(&self) -> Option<f64> {

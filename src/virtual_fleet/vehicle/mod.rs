@@ -25,6 +25,7 @@ use self::logbook::Logbook;
 use self::params::Params;
 pub use self::setup::{BootTimes, VehicleSetup};
 use self::show_mode::{Reload, ShowMode, Wish};
+pub use self::telemetry::REVISION;
 use self::telemetry::Streams;
 use self::words::{error, warning};
 use super::ftp_server::FtpServer;

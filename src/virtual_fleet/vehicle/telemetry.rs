@@ -30,6 +30,8 @@ pub(super) const DATA16: u32 = 169;
 pub(super) const AUTOPILOT_VERSION: u32 = 148;
 /// Capability bit of parameters as floats, which newer descriptions of MAVLink rename.
 const PARAM_FLOAT: u64 = 0x02;
+/// Revision that virtual vehicles state, in the place of their sources' own.
+pub const REVISION: [u8; 8] = *b"updraft\0";
 /// Shortest interval that is granted, us.
 const SHORTEST: Micros = 20_000;
 
@@ -298,7 +300,7 @@ impl Telling {
             capabilities,
             // 4.4.4, official.
             flight_sw_version: 0x0404_04FF,
-            flight_custom_version: *b"updraft\0",
+            flight_custom_version: REVISION,
             ..Default::default()
         })
     }

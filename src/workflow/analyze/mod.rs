@@ -199,7 +199,7 @@ fn input<'a>(
 }
 
 /// One flight as the analysis takes it, with all corrections.
-pub(crate) fn one_input<'a>(work: &'a Work, flight: &'a Found) -> FlightInput<'a> {
+pub fn one_input<'a>(work: &'a Work, flight: &'a Found) -> FlightInput<'a> {
     input(work, flight, None, Uncorrected::default())
 }
 

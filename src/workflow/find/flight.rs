@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::files::logs_in;
 use super::leaning::{leaning, leans_by_rotors};
 use super::of_start;
-use super::physics::{density, linear_thrust, sag};
+use super::physics::{density, is_of_simulator, linear_thrust, sag};
 use super::true_scales::true_scales;
 use super::{Found, Hashes};
 use crate::analysis::{LogInput, TruthSeries};
@@ -67,7 +67,7 @@ pub(super) fn found_flight(
         record.as_ref().and_then(|record| true_scales(&record.air, record.air_mps, forward_deg));
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
-        sag: sag(flown.is_some(), vehicle.as_ref()),
+        sag: sag(&|| flown.is_some() || of_virtual_drones(&logs), vehicle.as_ref()),
         wind_forms: vehicle
             .as_ref()
             .and_then(|vehicle| wind_forms(plan.site.ground_amsl_m, vehicle)),
@@ -89,6 +89,12 @@ pub(super) fn found_flight(
         seed: record.map(|record| record.seed),
         notes,
     })
+}
+
+/// Whether the logs are of virtual drones, by the first that can be read: no fleet is of both.
+fn of_virtual_drones(logs: &[LogInput]) -> bool {
+    let taken = logs.iter().filter(|log| log.refused.is_none());
+    taken.filter_map(|log| is_of_simulator(&log.path)).next().unwrap_or_default()
 }
 
 /// The record, if most of the logs are still those that it speaks of: somebody may have put the logs

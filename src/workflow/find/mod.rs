@@ -17,6 +17,7 @@ use self::files::logs_in;
 pub(crate) use self::files::stem;
 use self::flight::found_flight;
 use self::physics::density;
+pub(crate) use self::physics::{is_of_simulator, sag};
 use super::error::WorkflowError;
 use super::hashes::Hashes;
 use crate::analysis::battery::Sag;

@@ -1,12 +1,16 @@
 //! Physics of the vehicle that flew, as far as the analysis needs it: the pulse by density, thrust
 //! and voltage.
 
+use std::path::Path;
+
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::effects::Signal;
 use crate::effects::select::looks_at;
 use crate::flight::Indicator;
+use crate::log::{Log, Select};
 use crate::mission::Plan;
+use crate::sim::recorder::FIRMWARE_MARK;
 use crate::vehicle::Vehicle;
 
 /// Exponent of density for electric rotors with a real thrust curve.
@@ -30,10 +34,19 @@ pub(super) fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
 }
 
 /// How the battery acts on the pulse. Simulated drones without a battery in their physics log one
-/// that does nothing; real ones have one that does.
-pub(super) fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
+/// that does nothing, virtual ones that flew for a crew as well; real ones have one that does.
+pub(crate) fn sag(is_simulated: &dyn Fn() -> bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
     let has_battery = vehicle.is_some_and(|vehicle| looks_at(vehicle, Signal::ChargeUsed));
     let by_firmware = vehicle.is_some_and(|vehicle| vehicle.airframe.sitl.is_some());
     let sag = if by_firmware { Sag::SIMULATOR } else { Sag::default() };
-    (has_battery || !is_simulated).then_some(sag)
+    (has_battery || !is_simulated()).then_some(sag)
+}
+
+/// Whether a log is of our own simulator's firmware, by what it says of itself; `None` if it does not say.
+pub(crate) fn is_of_simulator(path: &Path) -> Option<bool> {
+    let log = Log::open(path).ok()?;
+    let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
+    let mut texts = tables.iter().filter_map(|table| table.text("Message")).flatten().peekable();
+    texts.peek()?;
+    Some(texts.any(|text| text.contains(FIRMWARE_MARK)))
 }

@@ -9,25 +9,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::agreement::{Agreement, Look};
 use super::of_map;
+use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::analysis::{AtHand, LogInput, analyze_flight};
+use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
-use crate::campaign::read_json;
+use crate::campaign::origin::LogOrigin;
+use crate::campaign::{FlightFolder, read_json};
 use crate::live::station::Station;
 use crate::live::view::{AirView, Step};
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric;
+use crate::vehicle::library;
 use crate::workflow::analyze::Settings;
 use crate::workflow::analyze::one_input;
 use crate::workflow::clock::{Clock, Micros, S};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::find::{Found, Work, find};
-use crate::workflow::host::Host;
+use crate::workflow::find::{Found, Work, find, sag};
+use crate::workflow::host::{Host, News};
 
 /// A first look is taken so long after the hover has begun, s.
-const FIRST_S: f64 = 25.0;
+const FIRST_S: f64 = 40.0;
 /// What is older does not count, s: the air of now is asked for.
 const WINDOW_S: f64 = 180.0;
 /// Looks are no closer together, us.
@@ -42,6 +47,8 @@ const MOTORS: usize = 4;
 pub(crate) struct AirWish {
     /// Folder of the campaign.
     pub(crate) campaign: PathBuf,
+    /// Folder of the flight.
+    pub(crate) folder: FlightFolder,
     /// An analysis.json with the calibration; absent: the campaign's own.
     pub(crate) law: Option<PathBuf>,
 }
@@ -50,12 +57,18 @@ pub(crate) struct AirWish {
 pub(crate) struct AirWatch {
     shared: Arc<Shared>,
     thread: Option<std::thread::JoinHandle<()>>,
+    station: Arc<Station>,
+    campaign: PathBuf,
+    flight: String,
+    reference: Arc<FlightAnalysis>,
 }
 
 struct Shared {
     stop: AtomicBool,
     guard: Mutex<()>,
     bell: Condvar,
+    /// What was shown so far.
+    looks: Mutex<Vec<Look>>,
 }
 
 impl AirWatch {
@@ -105,25 +118,82 @@ impl AirWatch {
             stop: AtomicBool::new(false),
             guard: Mutex::default(),
             bell: Condvar::new(),
+            looks: Mutex::default(),
         });
-        let (clock, station, of) =
-            (Arc::clone(host.clock()), Arc::clone(station), Arc::clone(&shared));
-        let body = move || watch(&of, &clock, &station, &found, &reference);
+        let reference = Arc::new(reference);
+        let mut watch = Self {
+            shared: Arc::clone(&shared),
+            thread: None,
+            station: Arc::clone(station),
+            campaign: wish.campaign.clone(),
+            flight: found.name.clone(),
+            reference: Arc::clone(&reference),
+        };
+        let (clock, station) = (Arc::clone(host.clock()), Arc::clone(station));
+        let vehicle = library::load(&wish.folder.vehicle().to_string_lossy()).ok();
+        // Virtual drones whose battery acts on nothing still tell of one.
+        let of_virtual = sag(&|| true, vehicle.as_ref());
+        let body = move || look_again(&shared, &clock, &station, (&found, of_virtual), &reference);
         let thread = std::thread::Builder::new().name("live air".to_owned()).spawn(body);
-        let thread = thread
-            .map_err(|error| WorkflowError::Failed(format!("failed to start a thread: {error}")))?;
-        Ok(Some(Self { shared, thread: Some(thread) }))
+        watch.thread = Some(thread.map_err(|error| {
+            WorkflowError::Failed(format!("failed to start a thread: {error}"))
+        })?);
+        Ok(Some(watch))
     }
-}
 
-impl Drop for AirWatch {
-    fn drop(&mut self) {
+    /// Shows the air of the logs, which are home, in place of that of telemetry, and says how far they are apart.
+    pub(crate) fn show_logs(&mut self, host: &dyn Host) {
+        self.end();
+        host.news(&News::Step(Step::Logs, "Analysing the logs".to_owned()));
+        match self.of_logs() {
+            Ok(Some(map)) => {
+                let looks = std::mem::take(
+                    &mut *self.shared.looks.lock().unwrap_or_else(PoisonError::into_inner),
+                );
+                let agreement =
+                    Agreement::of(&looks, &|slot, time_s| of_map::at(&map, slot, time_s));
+                if let Some(agreement) = &agreement {
+                    host.say(&agreement.to_string());
+                }
+                let (view, of) = final_view(&map, agreement.as_ref());
+                self.station.air(Some(view), of);
+            }
+            Ok(None) => host.warn("the page's air stays provisional: the logs give no map"),
+            Err(error) => {
+                host.warn(&format!(
+                    "the page's air stays provisional: {}",
+                    with_causes(&error, ": ")
+                ));
+            }
+        }
+    }
+
+    fn of_logs(&self) -> Result<Option<UpdraftMap>, WorkflowError> {
+        let mut work = Work::new(&self.campaign);
+        work.origin = Some(LogOrigin::Real);
+        find(&self.campaign, None, &mut work)?;
+        let found = work.flights.iter().find(|found| found.name == self.flight);
+        let Some(found) = found.filter(|found| !found.logs.is_empty()) else { return Ok(None) };
+        let settings = Settings::default();
+        let input = one_input(&work, found);
+        let looked = analyze_flight(&input, &settings.options, Some(&self.reference), &|_, _| {})
+            .map_err(|error| WorkflowError::Failed(with_causes(&error, ": ")))?;
+        Ok(looked.map)
+    }
+
+    fn end(&mut self) {
         self.shared.stop.store(true, Ordering::SeqCst);
         self.shared.bell.notify_all();
         if let Some(thread) = self.thread.take() {
             // A thread that has panicked has said so.
             let _ = thread.join();
         }
+    }
+}
+
+impl Drop for AirWatch {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -162,11 +232,11 @@ fn hover_s(plan: &Plan) -> Option<[f64; 2]> {
         .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
 }
 
-fn watch(
+fn look_again(
     shared: &Shared,
     clock: &Arc<dyn Clock>,
     station: &Station,
-    found: &Found,
+    (found, of_virtual): (&Found, Option<Sag>),
     reference: &FlightAnalysis,
 ) {
     let Some(plan) = &found.plan else { return };
@@ -195,7 +265,8 @@ fn watch(
                 ..LogInput::default()
             }
         });
-        let found = Found { logs: logs.collect(), ..found.clone() };
+        let sag = if station.are_virtual() { of_virtual } else { found.sag };
+        let found = Found { logs: logs.collect(), sag, ..found.clone() };
         if !found.logs.is_empty() {
             let work = Work::default();
             let input = one_input(&work, &found);
@@ -205,6 +276,8 @@ fn watch(
             if let Some(map) = looked.ok().and_then(|flight| flight.map) {
                 let rate_hz = station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
                 let (view, of) = shown(&map, [from_s, show_s], rate_hz);
+                let look = Look { time_s: view.time_s, of: of.clone() };
+                shared.looks.lock().unwrap_or_else(PoisonError::into_inner).push(look);
                 station.air(Some(view), of);
             }
         }
@@ -219,15 +292,8 @@ fn shown(
     [from_s, to_s]: [f64; 2],
     rate_hz: f64,
 ) -> (AirView, BTreeMap<u16, (f64, f64)>) {
-    let mut of = BTreeMap::new();
-    let mut latest_s = from_s;
-    for drone in &map.drones {
-        let last = of_map::values(drone).enumerate().rev().find_map(|(at, of)| Some((at, of?)));
-        if let (Some(slot), Some((at, (value, error)))) = (drone.slot, last) {
-            of.insert(slot, (value, error));
-            latest_s = latest_s.max(map.time_s.get(at).copied().unwrap_or(latest_s));
-        }
-    }
+    let (latest_s, of) = of_map::latest(map);
+    let latest_s = latest_s.unwrap_or(from_s);
     let posterior = map.posterior.as_ref();
     let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
     let view = AirView {
@@ -240,6 +306,30 @@ fn shown(
              The logs tell it again, and better.",
             to_s - from_s
         ),
+    };
+    (view, of)
+}
+
+/// What of the logs' map is shown: the end of the hover, and how far the page was from it.
+fn final_view(
+    map: &UpdraftMap,
+    agreement: Option<&Agreement>,
+) -> (AirView, BTreeMap<u16, (f64, f64)>) {
+    let (latest_s, of) = of_map::latest(map);
+    let posterior = map.posterior.as_ref();
+    let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
+    let mut note =
+        "From the logs: the mean is over the whole hover, the colours are of its last seconds."
+            .to_owned();
+    if let Some(agreement) = agreement {
+        note = format!("{note} {agreement}.");
+    }
+    let view = AirView {
+        provisional: false,
+        time_s: latest_s.unwrap_or_default(),
+        fleet_mps: posterior.and_then(|posterior| posterior.fleet).map(of_map::interval_mps),
+        map: grid.and_then(|grid| of_map::maps(grid).next_back()).map(|(_, map)| map),
+        note,
     };
     (view, of)
 }

@@ -1,5 +1,6 @@
 //! Flights in a browser: as they happen, and as they were.
 
+mod agreement;
 mod air;
 mod host;
 mod of_map;

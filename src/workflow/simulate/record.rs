@@ -1,7 +1,7 @@
 //! Logs of a simulated flight and their record: which exist, which fit, what was changed.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use rayon::prelude::*;
 
@@ -13,12 +13,11 @@ use crate::base::file::{
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
-use crate::log::{Log, Select};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
-use crate::sim::recorder::FIRMWARE_MARK;
 use crate::vehicle::Vehicle;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::find::is_of_simulator;
 use crate::workflow::made_by;
 
 /// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
@@ -156,25 +155,18 @@ pub(super) fn changed_logs(
             let log = known.get(&slot.slot).filter(|_| path.exists())?;
             match log.difference(&path) {
                 Ok(None) => None,
-                Ok(Some(_)) if is_of_others(&path) => Some(Err(WorkflowError::Usage(format!(
-                    "{} was not simulated by this program; move it away, or use another folder",
-                    path.shown()
-                )))),
+                Ok(Some(_)) if is_of_simulator(&path) == Some(false) => {
+                    Some(Err(WorkflowError::Usage(format!(
+                        "{} was not simulated by this program; move it away, or use another folder",
+                        path.shown()
+                    ))))
+                }
                 Ok(Some(how)) => Some(Ok((slot.slot, how))),
                 Err(error) => Some(Err(error.into())),
             }
         })
         .collect();
     Ok(changed?.into_iter().collect())
-}
-
-/// Whether a file is a log of another firmware than the simulator's.
-fn is_of_others(path: &Path) -> bool {
-    let Ok(log) = Log::open(path) else { return false };
-    let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
-    let texts: Vec<&String> =
-        tables.iter().filter_map(|table| table.text("Message")).flatten().collect();
-    !texts.is_empty() && !texts.iter().any(|text| text.contains(FIRMWARE_MARK))
 }
 
 pub(super) fn write_record(

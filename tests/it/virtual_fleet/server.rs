@@ -1,6 +1,6 @@
 //! A fleet behind real sockets on this computer.
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::UdpSocket;
 use std::sync::Arc;
 
 use nalgebra::Vector3;

@@ -7,6 +7,7 @@ use super::error::SimError;
 use super::flight::{FlightSetup, FlightSummary};
 use super::flying::OngoingFlight;
 use super::recorder::LogRecorder;
+use crate::effects::Reading;
 use dataflash::time::GpsTime;
 
 /// A flight whose log is taken away as it grows. All its pieces together are the log that
@@ -86,6 +87,12 @@ impl<'a> RecordedFlight<'a> {
     /// Takes the bytes by which the log has grown since the last call.
     pub fn take_log(&mut self) -> Vec<u8> {
         std::mem::take(&mut *self.tap.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// State of the battery as the log has it: the vehicle's own, or one that acts on nothing where its effects have
+    /// none. `None` when the log has ended.
+    pub fn battery(&self) -> Option<Reading> {
+        self.recorder.as_ref().map(LogRecorder::battery)
     }
 
     /// Outcome of the flight so far.

@@ -81,6 +81,21 @@ impl Battery {
         self.own.map_or(RESISTANCE_OHM, |own| own.resistance_ohm)
     }
 
+    /// State of the battery as the log has it.
+    pub(super) fn reading(&self) -> Reading {
+        let capacity_as = self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0);
+        Reading {
+            volts: self.volts(),
+            resting_v: self.resting_volts(),
+            amps: self.current_a,
+            used_ah: self.used_as / 3600.0,
+            charge: self.own.map_or(1.0 - self.used_as / capacity_as, |own| own.charge),
+            capacity_ah: capacity_as / 3600.0,
+            resistance_ohm: self.resistance_ohm(),
+            compensated: self.own.is_some_and(|own| own.compensated),
+        }
+    }
+
     /// Charge left, percent.
     pub(super) fn remaining_percent(&self) -> f64 {
         let capacity_as = self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0);

@@ -9,6 +9,7 @@ use super::full::{self, Full};
 use super::lights::Lights;
 use super::view::View;
 use super::{Moment, Recorder, control, navigation, start};
+use crate::effects::Reading;
 use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
 use dataflash::time::GpsTime;
 use dataflash::{LogWriter, MessageDef, catalog};
@@ -61,6 +62,11 @@ impl<'a, W: Write> LogRecorder<'a, W> {
             has_speeds: setup.vehicle.autopilot.esc_telemetry,
             rows,
         })
+    }
+
+    /// State of the battery in the latest rows.
+    pub(in crate::sim) fn battery(&self) -> Reading {
+        self.battery.reading()
     }
 
     /// Ends the log; returns its number of rows.
