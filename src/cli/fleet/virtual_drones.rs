@@ -114,6 +114,13 @@ fn mishaps(
 
 pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    if args.air.truth {
+        return Err(CommandError::Usage(
+            "--truth: virtual drones write no truth; `updraft simulate --truth` with the same --air and \
+             --seed writes that of the same air"
+                .to_owned(),
+        ));
+    }
     let vehicle = resolved_vehicle(&folder, None, &args.air.effects)?;
     let frame = plan.site.frame();
     let air = spec::build(&args.air.air(args.updraft), &frame, args.air.seed, &plan.name);

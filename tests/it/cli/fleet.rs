@@ -153,6 +153,7 @@ fn what_cannot_be_is_refused() {
     let key = ["--connect", &link, "--key", "bad.key"];
     refused(2, &[&["fleet", "status", "campaign"][..], &key].concat());
     refused(2, &["fleet", "virtual", "campaign", "--gone", "7"]);
+    refused(2, &["fleet", "virtual", "campaign", "--truth"]);
     refused(5, &["fleet", "virtual", "campaign", "--flown"]);
     let taken = UdpSocket::bind(("0.0.0.0", 0)).unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
