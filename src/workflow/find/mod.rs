@@ -19,6 +19,7 @@ use self::flight::found_flight;
 use self::physics::density;
 use super::error::WorkflowError;
 use super::hashes::Hashes;
+use super::shows::load::has_extension;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;
@@ -113,6 +114,13 @@ impl Work {
 ///
 /// If there is nothing, or a file that was named cannot be read.
 pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), WorkflowError> {
+    if has_extension(path, "csv") && path.is_file() {
+        return Err(WorkflowError::Usage(format!(
+            "{} is a table, not a log: say in a mapping file what its columns are, and give that with --csv \
+             (docs/csv.md)",
+            path.shown()
+        )));
+    }
     if path.is_dir() && campaign::is_campaign(path) {
         let index = campaign::index_path(path);
         if index.is_file() && work.title.is_empty() {
