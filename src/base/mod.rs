@@ -15,4 +15,4 @@ pub mod shard;
 pub use dataflash::time;
 pub use multirotor_sim::{air, rng};
 pub use skybrush_show::frame;
-pub use untrusted_io::{crc, file, number, owner, parse, plain, private};
+pub use untrusted_io::{crc, file, names, number, owner, parse, plain, private};

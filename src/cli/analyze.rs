@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::analyze_each;
@@ -18,7 +19,7 @@ use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
 use crate::base::plain::Shown as _;
 use crate::base::shard::Share;
 use crate::flight::Indicator;
-use crate::report::terminal_summary;
+use crate::report::{NO_EDGE, terminal_summary};
 use crate::workflow::analyze::each::record_path;
 use crate::workflow::analyze::{
     Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
@@ -232,8 +233,8 @@ impl AnalyzeOptions {
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct AnalyzeOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct AnalyzeOutput<'a> {
     schema: &'static str,
     report: Option<PathBuf>,
     analysis: &'a Analysis,
@@ -340,7 +341,8 @@ fn finish(
     let analysed = analysing.run(output.is_some())?;
     let Analysed { analysis, logs, .. } = &analysed;
     if !context.json {
-        context.print(&terminal_summary(analysis, WIDTH, context.color))?;
+        let width = if context.width.is_some() { WIDTH } else { NO_EDGE };
+        context.print(&terminal_summary(analysis, width, context.color))?;
     }
     let page = output.map(|folder| analysed.write(context, folder)).transpose()?.flatten();
     let nothing = analysed.is_nothing();

@@ -5,19 +5,20 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::words::wrap;
 use crate::base::plain::Shown as _;
-use crate::check::CheckReport;
+use crate::check::{CheckReport, causes};
 use crate::vehicle::library;
 use crate::workflow::check::{Subject, allowed, is_safe, known, say_findings, subjects, verdict};
 use crate::workflow::clock::Stopwatch;
 
-/// Findings of each kind that are listed unless all are asked for.
-const FEW: usize = 5;
+/// Findings of each kind that are looked through for their causes, unless all are listed.
+const MANY: usize = 10_000;
 
 /// Arguments of `updraft check`.
 #[derive(Debug, Args)]
@@ -43,14 +44,15 @@ pub(super) struct CheckArgs {
     /// Pass even if this check (given by name) fails; can be repeated
     #[arg(long, value_name = "CHECK")]
     allow: Vec<String>,
-    /// List every finding, not only the first few of each kind (--json always does)
+    /// List every finding, not one line for each cause (--json always does)
     #[arg(short, long)]
     verbose: bool,
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct CheckOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct CheckOutput<'a> {
+    /// Format name and version: `updraft.check/1`.
     schema: &'static str,
     /// Nothing is wrong, allowed or not.
     safe: bool,
@@ -58,13 +60,17 @@ struct CheckOutput<'a> {
     passed: bool,
     /// Errors that were allowed, by check.
     allowed: BTreeMap<&'static str, usize>,
+    /// The shows that were checked.
     shows: Vec<ShowOutput<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ShowOutput<'a> {
+    /// File or folder of the show.
     path: &'a Path,
+    /// What differs between its files and its plan.
     mismatches: &'a [String],
+    /// What the checks found; null: there is no plan.
     report: Option<&'a CheckReport>,
 }
 
@@ -119,7 +125,7 @@ fn show_report(
     let width = context.width;
     if context.quiet {
         if let Some(report) = report {
-            say_findings(context, report, &args.allow);
+            say_findings(context, report, &args.allow, args.verbose);
         }
         for mismatch in &subject.mismatches {
             context.insist(&format!("error: {mismatch}"));
@@ -128,8 +134,13 @@ fn show_report(
     }
     let mut text = format!("{}\n", subject.path.shown());
     if let Some(report) = report {
-        let _ = writeln!(text, "{report}");
-        if report.counts.values().any(|count| count.omitted > 0) && !args.verbose {
+        let _ = if args.verbose {
+            writeln!(text, "{}", report.each_finding())
+        } else {
+            writeln!(text, "{report}")
+        };
+        let merged = causes(&report.findings).len() < report.findings.len();
+        if merged && !args.verbose {
             text += "(--verbose lists every finding)\n";
         }
     }
@@ -139,7 +150,7 @@ fn show_report(
     context.print(&wrap(&text, width))
 }
 
-/// How many findings of each kind are listed.
+/// How many findings of each kind are kept.
 pub(super) fn few(context: &Context, verbose: bool) -> usize {
-    if context.json || verbose { usize::MAX } else { FEW }
+    if context.json || verbose { usize::MAX } else { MANY }
 }

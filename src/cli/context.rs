@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::Global;
 use super::exit::CommandError;
 use super::fleet::bar::LogsBar;
+use super::help_text;
 use super::progress::Bar;
 use super::signals::Signals;
 use crate::base::plain::{Shown as _, for_terminal, json_for_terminal};
@@ -35,6 +36,8 @@ pub(super) struct Context {
     signals: Signals,
     /// Whether something was said that must be said even when quiet.
     insisted: Arc<AtomicBool>,
+    /// Whether there is an object on standard output.
+    printed_json: Arc<AtomicBool>,
     clock: RunClock,
 }
 
@@ -89,6 +92,7 @@ impl Context {
             width: columns(),
             signals,
             insisted: Arc::default(),
+            printed_json: Arc::default(),
             clock: RunClock::of(global),
         };
         if let Err(error) = installed {
@@ -143,12 +147,17 @@ impl Context {
     }
 
     /// Data as one JSON object, on standard output.
-    #[expect(clippy::unused_self, reason = "prints like the other methods")]
     pub(super) fn print_json<T: Serialize>(&self, value: &T) -> Result<(), CommandError> {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
+        self.printed_json.store(true, Ordering::Relaxed);
         write_out(&json_for_terminal(&text)).map_err(CommandError::Output)
+    }
+
+    /// Whether [`Self::print_json`] was called.
+    pub(super) fn has_printed_json(&self) -> bool {
+        self.printed_json.load(Ordering::Relaxed)
     }
 
     /// Talk, on standard error, unless quiet.
@@ -175,6 +184,15 @@ impl Context {
         self.insisted.store(true, Ordering::Relaxed);
         complain(text);
     }
+}
+
+/// Help or version, on standard output, with styles on a terminal that takes them.
+pub(super) fn emit_help(text: &clap::builder::StyledStr) -> io::Result<()> {
+    let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let styled = io::stdout().is_terminal() && !no_color;
+    // What clap made of this program's own words.
+    let text = if styled { text.ansi().to_string() } else { text.to_string() };
+    write_out(&help_text::printed(&text))
 }
 
 fn write_out(text: &str) -> io::Result<()> {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -49,7 +50,7 @@ enum EffectsCommand {
     },
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ParameterOutput {
     name: &'static str,
     unit: &'static str,
@@ -59,7 +60,7 @@ struct ParameterOutput {
     high: f64,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct EffectOutput {
     name: &'static str,
     title: &'static str,
@@ -71,21 +72,28 @@ struct EffectOutput {
     signals: &'static [Signal],
     acts_on: &'static [Hook],
     on: bool,
+    /// What it adds to the response in hover, us/(m/s); absent: it does not look at the vertical air speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hover_us_per_mps: Option<f64>,
     parameters: Vec<ParameterOutput>,
     curve: CurveOutput,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct CurveOutput {
     signal: Signal,
     points: Vec<(f64, f64)>,
 }
 
-#[derive(Serialize)]
-struct EffectsOutput {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct EffectsOutput {
+    /// Format name and version: `updraft.effects/1`.
     schema: &'static str,
+    /// Vehicle that sizes are stated for.
     vehicle: String,
+    /// Change of the pulse per relative change of thrust in hover (du/dlnT), us.
     sensitivity_us: f64,
+    /// The effects, in the order in which they act.
     effects: Vec<EffectOutput>,
 }
 
@@ -199,9 +207,34 @@ fn explained(effect: &dyn Effect, vehicle: &Vehicle) -> Result<String, CommandEr
             let _ = writeln!(text, "  {:>9}  {us:+9.2}", number(*value));
         }
     }
+    if let Some(slope) = hover_us_per_mps(effect, vehicle)? {
+        let _ = writeln!(
+            text,
+            "In hover      {slope:+.1} us/(m/s): what it adds to the response to the air"
+        );
+    }
     text.push('\n');
     text.push_str(&text_plot(&curve(effect, vehicle, 61)?, low, high));
     Ok(text)
+}
+
+/// Half of the step of the slope in hover, m/s: gusts of a field day.
+const HOVER_STEP_MPS: f64 = 0.5;
+
+/// What an effect adds to the response in hover, us/(m/s); `None` where it does not look at the vertical air speed.
+fn hover_us_per_mps(effect: &dyn Effect, vehicle: &Vehicle) -> Result<Option<f64>, CommandError> {
+    let (signal, low, high) = effect.definition().shown;
+    if signal != Signal::Climb || low >= -HOVER_STEP_MPS || high <= HOVER_STEP_MPS {
+        return Ok(None);
+    }
+    let points = curve(effect, vehicle, POINTS)?;
+    let at = |climb_mps: f64| {
+        let after = points.iter().position(|(value, _)| *value >= climb_mps)?;
+        let ((x0, y0), (x1, y1)) = (points.get(after.checked_sub(1)?)?, points.get(after)?);
+        Some(y0 + (y1 - y0) * (climb_mps - x0) / (x1 - x0))
+    };
+    let (up, down) = (at(HOVER_STEP_MPS), at(-HOVER_STEP_MPS));
+    Ok(up.zip(down).map(|(up, down)| (up - down) / (2.0 * HOVER_STEP_MPS)))
 }
 
 /// Text in lines of at most 80 columns. All but the first start with `indent`; on the first, a label of
@@ -233,6 +266,7 @@ fn output(
                 signals: definition.signals,
                 acts_on: definition.hooks,
                 on: is_on(*effect, vehicle),
+                hover_us_per_mps: hover_us_per_mps(*effect, vehicle)?,
                 parameters: parameters
                     .map(|(parameter, value)| ParameterOutput {
                         name: parameter.name,

@@ -2,6 +2,9 @@
 
 use std::process::ExitCode;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::blind::BlindError;
 use crate::campaign::CampaignError;
 use crate::gap::GapError;
@@ -125,19 +128,32 @@ fn of_name(name: &str) -> Exit {
     if is_path { Exit::Failed } else { Exit::Usage }
 }
 
+/// The last line on standard error of a command with `--json` that has failed.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct ErrorOutput<'a> {
+    /// Reasons, each behind what it is the reason of.
+    because: Vec<&'a str>,
+    /// What went wrong, in one sentence.
+    error: &'a str,
+    /// Exit code of the program.
+    exit: u8,
+    /// Format name and version: `updraft.error/1`.
+    schema: &'static str,
+}
+
 /// An error as one line of JSON, for `--json`.
 pub(super) fn as_json(text: &str, exit: Exit) -> String {
     let mut parts = text.split(BECAUSE);
     let error = parts.next().unwrap_or_default();
     let error = error.strip_prefix("error: ").unwrap_or(error);
-    let because: Vec<_> = parts.collect();
-    serde_json::json!({
-        "schema": "updraft.error/1",
-        "exit": exit as u8,
-        "error": error,
-        "because": because,
-    })
-    .to_string()
+    let output = ErrorOutput {
+        because: parts.collect(),
+        error,
+        exit: exit as u8,
+        schema: "updraft.error/1",
+    };
+    // Texts and a number cannot fail.
+    serde_json::to_string(&output).unwrap_or_default()
 }
 
 /// Whether standard output was closed by its reader, which is how pipes end.

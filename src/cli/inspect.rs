@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -34,14 +35,14 @@ pub(super) struct InspectArgs {
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct InspectDocument<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct InspectDocument<'a> {
     schema: &'static str,
     #[serde(flatten)]
     found: &'a InspectOutput,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum InspectOutput {
     Log(Box<Inventory>),

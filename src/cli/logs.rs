@@ -5,9 +5,13 @@ mod cards;
 mod dry;
 mod listing;
 
+pub(super) use cards::ImportOutput;
+pub(super) use listing::ListOutput;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -19,10 +23,11 @@ use super::words;
 use crate::base::plain::Shown as _;
 use crate::fleet::logs::one::Which;
 use crate::mission::Plan;
-use crate::workflow::fleet::bring::Wish;
+use crate::workflow::fleet::bring::{Brought, Wish};
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::logs::{self, has_slots};
 use crate::workflow::fleet::one_flight;
+use crate::workflow::fleet::output::LogOutput;
 use crate::workflow::fleet::server::{list as list_through, pull as pull_through};
 use crate::workflow::fleet::verify::{VerifyRow, verify_all};
 use crate::workflow::slots::SlotSet;
@@ -164,10 +169,20 @@ fn gone() -> CommandError {
     )
 }
 
-#[derive(Serialize)]
-struct PullOutput<T> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct PullOutput {
+    /// Format name and version: `updraft.pull/1`.
     schema: &'static str,
-    logs: Vec<T>,
+    /// The logs, in slot order.
+    logs: PulledLogs,
+}
+
+/// Logs over the drones' own links, or through Skybrush Server.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+enum PulledLogs {
+    OverLinks(Vec<Brought>),
+    ThroughServer(Vec<LogOutput>),
 }
 
 /// The command that brings these slots' logs, over the same links and with the same options.
@@ -233,7 +248,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
             let rows = pull_through(context, &address, &folder, &plan, slots, &wish, wait_s)?;
             let lost = rows.iter().filter(|row| row.is_missing()).map(|row| row.slot);
             let lost: Vec<u16> = lost.collect();
-            return end_pull(context, args, &plan, rows, &lost);
+            return end_pull(context, args, &plan, PulledLogs::ThroughServer(rows), &lost);
         }
         Target::Sim => return Err(gone()),
     };
@@ -243,15 +258,15 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let brought = logs::pull(context, &mut crew, slots, wait_s, &wish)?;
     let lost: Vec<u16> =
         brought.iter().filter(|one| one.is_missing()).map(|one| one.slot).collect();
-    end_pull(context, args, &plan, brought, &lost)
+    end_pull(context, args, &plan, PulledLogs::OverLinks(brought), &lost)
 }
 
 /// What to do about lost logs, and all of it for programs.
-fn end_pull<T: Serialize>(
+fn end_pull(
     context: &Context,
     args: &PullArgs,
     plan: &Plan,
-    logs: Vec<T>,
+    logs: PulledLogs,
     lost: &[u16],
 ) -> Result<Exit, CommandError> {
     if !lost.is_empty() {
@@ -263,8 +278,8 @@ fn end_pull<T: Serialize>(
     Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
 
-#[derive(Serialize)]
-struct VerifyOutput {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct VerifyOutput {
     schema: &'static str,
     logs: Vec<VerifyRow>,
 }

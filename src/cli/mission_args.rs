@@ -18,40 +18,40 @@ pub(super) struct MissionArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) drones: Option<i64>,
     /// Distance between neighbours, m
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = metres, allow_negative_numbers = true)]
     pub(super) spacing: Option<f64>,
     /// Latitude and longitude of the grid's centre, degrees
     #[arg(long, value_name = "LAT,LON", value_parser = parse_origin, allow_hyphen_values = true)]
     pub(super) origin: Option<(f64, f64)>,
     /// Ground height above mean sea level, m
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", value_parser = metres, allow_hyphen_values = true)]
     pub(super) ground: Option<f64>,
     /// Direction of the rows, degrees clockwise from north
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", value_parser = degrees, allow_hyphen_values = true)]
     pub(super) orientation: Option<f64>,
     /// Vehicle: a built-in name or a vehicle file
     #[arg(long, value_name = "NAME")]
     pub(super) vehicle: Option<String>,
     /// Speeds of the ladder in the order they are flown, m/s
-    #[arg(long, value_name = "V,V,...", allow_hyphen_values = true, value_delimiter = ',')]
+    #[arg(long, value_name = "V,V,...", value_parser = speed, allow_hyphen_values = true, value_delimiter = ',')]
     pub(super) speeds: Vec<f64>,
     /// Duration of each leg of the ladder, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) leg: Option<f64>,
     /// Duration of the hovers between legs, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) hover: Option<f64>,
     /// Height of the lower hovers above ground, m
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = metres, allow_negative_numbers = true)]
     pub(super) baseline: Option<f64>,
     /// Height of the measurement hover above ground, m
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = metres, allow_negative_numbers = true)]
     pub(super) height: Option<f64>,
     /// Duration of the measurement hover, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) duration: Option<f64>,
     /// Acceleration of ramps between legs, m/s² (0: steps)
-    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    #[arg(long, value_name = "A", value_parser = acceleration, allow_negative_numbers = true)]
     pub(super) ramp: Option<f64>,
     /// Any other value of the template: --set grid.spacing_m=5, --set hover.duration_s=60
     #[arg(long, value_name = "KEY=VALUE")]
@@ -68,6 +68,30 @@ fn parse_origin(text: &str) -> Result<(f64, f64), String> {
     text.split_once(',')
         .and_then(|(lat, lon)| Some((lat.trim().parse().ok()?, lon.trim().parse().ok()?)))
         .ok_or_else(|| "write it as latitude,longitude in degrees: 47.4733,19.0621".to_owned())
+}
+
+fn number(text: &str, unit: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| format!("a number in {unit}, written without the unit: 100"))
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    number(text, "metres")
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    number(text, "seconds")
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    number(text, "degrees")
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "speeds in m/s with commas between them: 0.5,1,1.5".to_owned())
+}
+
+fn acceleration(text: &str) -> Result<f64, String> {
+    number(text, "m/s²")
 }
 
 impl MissionArgs {

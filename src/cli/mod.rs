@@ -13,11 +13,13 @@ pub mod exit;
 mod fleet;
 mod fly;
 mod gap;
+mod help_text;
 mod hidden;
 mod inspect;
 mod live;
 mod live_args;
 mod logs;
+mod manual;
 mod mission_args;
 mod origin;
 mod physics;
@@ -39,6 +41,7 @@ use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
+use serde::Serialize;
 
 use context::{Context, complain};
 use exit::{CommandError, Exit, exit_of};
@@ -165,27 +168,17 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
     Completions(tools::CompletionsArgs),
-    /// Print the manual page
-    Man,
+    /// Print the manual page of a command, or write those of all
+    Man(manual::ManArgs),
     /// Print the JSON schema of a file format
     Schema(tools::SchemaArgs),
 }
 
 /// Runs the program; the only place where an exit code is made.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            let error = quoting_plainly(&error);
-            let asked = std::env::args_os().any(|word| word == "--json");
-            if error.use_stderr() && asked {
-                let text = error.to_string();
-                complain(&exit::as_json(text.trim_end(), Exit::Usage));
-            } else {
-                let _ = error.print();
-            }
-            return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
-        }
+    let (cli, name) = match help_text::parse(std::env::args_os()) {
+        Ok(parsed) => parsed,
+        Err(error) => return answer(&error),
     };
     use_threads_of_job();
     let context = Context::new(&cli.global);
@@ -194,7 +187,7 @@ pub fn main() -> ExitCode {
             if exit == Exit::Losses {
                 context.account_for_losses();
             }
-            exit.into()
+            if context.json { ending_as_json(&context, &name, exit) } else { exit.into() }
         }
         Err(error) => {
             if exit_of(&error) != Exit::Done {
@@ -209,6 +202,60 @@ pub fn main() -> ExitCode {
             exit_of(&error).into()
         }
     }
+}
+
+/// Prints the help that was asked for, or what is wrong with the command line.
+fn answer(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        return match context::emit_help(&error.render()) {
+            Ok(()) => Exit::Done.into(),
+            Err(error) if exit::is_end_of_pipe(&error) => Exit::Done.into(),
+            Err(_) => Exit::Failed.into(),
+        };
+    }
+    let error = quoting_plainly(error);
+    if std::env::args_os().any(|word| word == "--json") {
+        let text = help_text::printed(&error.to_string());
+        complain(&exit::as_json(text.trim_end(), Exit::Usage));
+    } else {
+        let _ = error.print();
+    }
+    Exit::Usage.into()
+}
+
+/// What `--json` prints where a command has no numbers or names to tell.
+#[derive(Serialize, schemars::JsonSchema)]
+struct DoneOutput<'a> {
+    /// Format name and version: `updraft.done/1`.
+    schema: &'static str,
+    /// Words of the command: `fleet restore`.
+    command: &'a str,
+    /// Exit code: 0, or 3 where something was lost; warnings on standard error say what.
+    exit: u8,
+}
+
+/// Keeps the promise of `--json`: one object on standard output if the command has done its work; else an error as the last
+/// line of standard error.
+fn ending_as_json(context: &Context, command: &str, exit: Exit) -> ExitCode {
+    let error = match exit {
+        Exit::Done | Exit::Losses => {
+            if !context.has_printed_json() {
+                let output = DoneOutput { schema: "updraft.done/1", command, exit: exit as u8 };
+                if let Err(error) = context.print_json(&output) {
+                    return exit_of(&error).into();
+                }
+            }
+            return exit.into();
+        }
+        Exit::Unsafe if context.has_printed_json() => {
+            "a check failed, or somebody answered no: the object on standard output says which"
+        }
+        Exit::Unsafe => "a check failed, or somebody answered no: nothing was started",
+        Exit::Nothing => "there is no result; the lines above say why",
+        _ => "the command failed; the lines above say why",
+    };
+    complain(&exit::as_json(error, exit));
+    exit.into()
 }
 
 /// Inside of a Slurm job that asked for a number of processors, so many threads are used: where jobs are not
@@ -228,7 +275,7 @@ fn quoting_plainly(error: &clap::Error) -> clap::Error {
     let given = std::env::args_os().map(|word| plain(&word.to_string_lossy()).into_owned());
     // Whether it is an error may hang on such a character.
     let anyhow = || clap::Error::raw(error.kind(), for_terminal(&error.to_string(), false));
-    Cli::try_parse_from(given).err().unwrap_or_else(anyhow)
+    help_text::parse(given).err().unwrap_or_else(anyhow)
 }
 
 fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
@@ -251,7 +298,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),
-        Command::Man => tools::man(context, Cli::command()),
+        Command::Man(args) => manual::run(context, &args, Cli::command()),
         Command::Schema(args) => tools::schema(context, &args),
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -80,14 +81,14 @@ fn parse_home(text: &str) -> Result<Home, String> {
     }
 }
 
-#[derive(Serialize)]
-struct PhysicsOutput {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct PhysicsOutput {
     schema: &'static str,
     vehicle: String,
     instances: Vec<InstanceOutput>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct InstanceOutput {
     instance: usize,
     listen: SocketAddr,
@@ -118,7 +119,7 @@ pub(super) fn run(context: &Context, args: &PhysicsArgs) -> Result<Exit, Command
     }
     let (vehicle, served) = physics::run(context, &wish)?;
     let flown = served.iter().any(|served| served.status.frames > 0);
-    if context.json {
+    if context.json && flown {
         let output = |(instance, served): (usize, Served)| InstanceOutput {
             instance,
             listen: served.listen,

@@ -3,18 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::check::few;
 use super::context::Context;
-use super::exit::{CommandError, Exit, is_end_of_pipe};
+use super::exit::{BECAUSE, CommandError, Exit, is_end_of_pipe};
 use super::mission_args::MissionArgs;
 use super::{timetable, words};
 use crate::base::plain::Shown as _;
 use crate::check::CheckReport;
 use crate::mission::Plan;
 use crate::mission::resolve::builtin_names;
-use crate::workflow::check::{Origin, allowed, checked, is_safe, known, say_findings, verdict};
+use crate::mission::too_fast::too_fast;
+use crate::workflow::check::{
+    Origin, allowed, checked, is_safe, known, refusals, say_findings, verdict,
+};
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::plan::{legs_buy, what_for_whom, write};
 
@@ -44,7 +48,7 @@ pub(super) struct PlanArgs {
     /// Plan and check, but write nothing
     #[arg(long)]
     dry_run: bool,
-    /// List every finding, not only the first few of each kind (--json always does)
+    /// List every finding, not one line for each cause (--json always does)
     #[arg(short, long)]
     verbose: bool,
     /// Write the show even if this check (given by name) fails; can be repeated
@@ -55,16 +59,21 @@ pub(super) struct PlanArgs {
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct PlanOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct PlanOutput<'a> {
+    /// Format name and version: `updraft.plan-output/1`.
     schema: &'static str,
+    /// Folder that was written; null: none was, as asked for.
     folder: Option<&'a Path>,
+    /// Flights in their order.
     flights: Vec<FlightOutput<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct FlightOutput<'a> {
+    /// The plan.
     plan: &'a Plan,
+    /// What the checks found.
     check: &'a CheckReport,
 }
 
@@ -92,7 +101,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
                 return read.map(|()| Exit::Done);
             }
         }
-        say_findings(context, &report, &args.allow);
+        say_findings(context, &report, &args.allow, args.verbose);
         safe &= is_safe(&report, &args.allow);
         shows.push(show);
         reports.push(report);
@@ -103,6 +112,20 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         write(context, &mission, &shows, &folder, args.force)?;
     }
     read?;
+    if !safe {
+        for wrong in mission.flights.iter().filter_map(too_fast) {
+            context.insist(&wrong.to_string());
+        }
+        if context.json {
+            let refused = reports.iter().flat_map(|report| refusals(report, &args.allow));
+            let why: String = refused.map(|cause| format!("{BECAUSE}{cause}")).collect();
+            return Err(CommandError::Unsafe(format!(
+                "nothing was written: the show is not safe as it is{why}"
+            )));
+        }
+        context.insist("Nothing was written: the show is not safe as it is");
+        return Ok(Exit::Unsafe);
+    }
     if context.json {
         context.print_json(&PlanOutput {
             schema: "updraft.plan-output/1",
@@ -114,10 +137,6 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
                 .map(|(flight, check)| FlightOutput { plan: &flight.plan, check })
                 .collect(),
         })?;
-    }
-    if !safe {
-        context.insist("Nothing was written: the show is not safe as it is");
-        return Ok(Exit::Unsafe);
     }
     let allowed = allowed(reports.iter(), &args.allow);
     if !allowed.is_empty() {

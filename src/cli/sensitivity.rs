@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -29,8 +30,8 @@ pub(super) struct Asked {
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct SensitivityOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct SensitivityOutput<'a> {
     schema: &'static str,
     report: PathBuf,
     flown: usize,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::words;
+use crate::base::names::listed;
 use crate::show::FenceZone;
 use crate::show::summary::{DroneSummary, ShowSummary, SkybSummary};
 
@@ -95,7 +96,7 @@ fn describe_remarks(text: &mut String, show: &ShowSummary) {
         text.push('\n');
     }
     for (remark, drones) in remarks {
-        let _ = writeln!(text, "{}: {remark}", words::range(&drones));
+        let _ = writeln!(text, "{}: {remark}", listed(drones));
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -165,8 +166,8 @@ pub(super) fn parse_slots(text: &str) -> Result<SlotSet, String> {
     text.parse()
 }
 
-#[derive(Serialize)]
-struct SimulateOutput {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct SimulateOutput {
     schema: &'static str,
     flights: Vec<Flown>,
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -69,8 +70,8 @@ pub(super) struct SweepArgs {
 }
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct SweepOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct SweepOutput<'a> {
     schema: &'static str,
     report: PathBuf,
     flown: usize,
@@ -134,7 +135,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
 
 /// Columns of the terminal summary.
 fn width(context: &Context) -> usize {
-    context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH))
+    context.width.map_or(report::NO_EDGE, |columns| columns.clamp(MIN_WIDTH, WIDTH))
 }
 
 fn ladder(context: &Context, args: &SweepArgs, study: &StudyPlan) -> Result<Exit, CommandError> {

@@ -1,14 +1,30 @@
-//! Completions, manual page and schemas, all made from the definitions they describe.
+//! Completions and schemas, made from the definitions they describe.
 
 use clap::{Args, ValueEnum};
 use clap_complete::Shell;
-use schemars::schema_for;
+use schemars::{JsonSchema, Schema, schema_for};
+use serde::Serialize;
 
+use super::DoneOutput;
+use super::analyze::AnalyzeOutput;
 use super::analyze_each::EachOutput;
+use super::check::CheckOutput;
 use super::cluster::output::{CancelOutput, ScriptOutput, SubmitOutput};
 use super::context::Context;
-use super::exit::{CommandError, Exit};
+use super::effects::EffectsOutput;
+use super::exit::{CommandError, ErrorOutput, Exit};
+use super::fleet::dry::DryOutput;
+use super::fleet::tables::{EndOutput, FleetStatus, FleetUpload};
+use super::gap::GapOutput;
+use super::inspect::InspectDocument;
+use super::logs::{ImportOutput, ListOutput, PullOutput, VerifyOutput};
+use super::manual::ManOutput;
+use super::physics::PhysicsOutput;
+use super::plan::PlanOutput;
+use super::sensitivity::SensitivityOutput;
 use super::shard_args::ShardOutput;
+use super::simulate::SimulateOutput;
+use super::sweep::SweepOutput;
 use crate::analysis::result::Analysis;
 use crate::archive::index::ArchiveIndex;
 use crate::blind::game::GameFile;
@@ -39,13 +55,30 @@ use crate::workflow::game::verify::Verification;
 
 /// Arguments of `updraft completions`.
 #[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft completions bash > ~/.local/share/bash-completion/completions/updraft
+  updraft completions fish")]
 pub(super) struct CompletionsArgs {
     /// Which shell
     shell: Shell,
 }
 
+/// What `updraft completions --json` prints.
+#[derive(Serialize, JsonSchema)]
+struct CompletionsOutput<'a> {
+    /// Format name and version: `updraft.completions/1`.
+    schema: &'static str,
+    /// Name of the shell.
+    shell: String,
+    /// The script.
+    script: &'a str,
+}
+
 /// Arguments of `updraft schema`.
 #[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft schema plan
+  updraft schema check                            (what `updraft check --json` prints)")]
 pub(super) struct SchemaArgs {
     /// Which format
     #[arg(value_enum)]
@@ -125,12 +158,62 @@ pub enum Format {
     Archive,
     /// archive.json of an archive
     ArchiveIndex,
+    /// what `updraft plan --json` prints
+    PlanOutput,
+    /// what `updraft check --json` prints
+    Check,
+    /// what `updraft simulate --json` prints
+    Simulate,
+    /// what `updraft analyze --json` and `updraft run --json` print
+    Analyze,
+    /// what `updraft inspect --json` prints
+    Inspect,
+    /// what `updraft effects --json` prints
+    Effects,
+    /// what `updraft gap --json` prints
+    Gap,
+    /// what `updraft sweep --json` prints
+    Sweep,
+    /// what `updraft sweep --json` prints of a sensitivity study
+    SweepSensitivity,
+    /// what `updraft physics --json` prints
+    Physics,
+    /// what `updraft fleet status --json` prints
+    FleetStatus,
+    /// what `updraft fleet upload --json` prints
+    Upload,
+    /// what `updraft fleet abort --json` and `fleet land --json` print
+    Abort,
+    /// what `--dry-run --json` prints of a command that sends something to drones
+    DryRun,
+    /// what `updraft logs list --json` prints
+    LogList,
+    /// what `updraft logs pull --json` prints
+    Pull,
+    /// what `updraft logs verify --json` prints
+    Verify,
+    /// what `updraft logs import --json` prints
+    Import,
+    /// what `updraft man --json` prints
+    Man,
+    /// what `updraft completions --json` prints
+    Completions,
+    /// what other commands print with --json when they have done their work
+    Done,
+    /// the last line on standard error of a command with --json that has failed
+    Error,
 }
 
 impl Format {
     /// The JSON schema, pretty, with a final newline.
     pub fn schema(self) -> Result<String, serde_json::Error> {
-        let schema = match self {
+        let mut text = serde_json::to_string_pretty(&self.made())?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    fn made(self) -> Schema {
+        match self {
             Self::Plan => schema_for!(Plan),
             Self::Campaign => schema_for!(CampaignIndex),
             Self::Flight => schema_for!(FlightRecord),
@@ -166,10 +249,29 @@ impl Format {
             Self::AnalyzeEach => schema_for!(EachOutput),
             Self::Archive => schema_for!(ArchiveOutput),
             Self::ArchiveIndex => schema_for!(ArchiveIndex),
-        };
-        let mut text = serde_json::to_string_pretty(&schema)?;
-        text.push('\n');
-        Ok(text)
+            Self::PlanOutput => schema_for!(PlanOutput<'_>),
+            Self::Check => schema_for!(CheckOutput<'_>),
+            Self::Simulate => schema_for!(SimulateOutput),
+            Self::Analyze => schema_for!(AnalyzeOutput<'_>),
+            Self::Inspect => schema_for!(InspectDocument<'_>),
+            Self::Effects => schema_for!(EffectsOutput),
+            Self::Gap => schema_for!(GapOutput<'_>),
+            Self::Sweep => schema_for!(SweepOutput<'_>),
+            Self::SweepSensitivity => schema_for!(SensitivityOutput<'_>),
+            Self::Physics => schema_for!(PhysicsOutput),
+            Self::FleetStatus => schema_for!(FleetStatus<'_>),
+            Self::Upload => schema_for!(FleetUpload),
+            Self::Abort => schema_for!(EndOutput),
+            Self::DryRun => schema_for!(DryOutput),
+            Self::LogList => schema_for!(ListOutput),
+            Self::Pull => schema_for!(PullOutput),
+            Self::Verify => schema_for!(VerifyOutput),
+            Self::Import => schema_for!(ImportOutput),
+            Self::Man => schema_for!(ManOutput),
+            Self::Completions => schema_for!(CompletionsOutput<'_>),
+            Self::Done => schema_for!(DoneOutput<'_>),
+            Self::Error => schema_for!(ErrorOutput<'_>),
+        }
     }
 }
 
@@ -180,24 +282,25 @@ pub(super) fn completions(
 ) -> Result<Exit, CommandError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "updraft", &mut script);
-    context.emit(&String::from_utf8_lossy(&script))?;
-    Ok(Exit::Done)
-}
-
-pub(super) fn man(context: &Context, command: clap::Command) -> Result<Exit, CommandError> {
-    let mut page = Vec::new();
-    clap_mangen::Man::new(command)
-        .render(&mut page)
-        .map_err(|error| CommandError::Failed(format!("failed to make the page: {error}")))?;
-    context.emit(&String::from_utf8_lossy(&page))?;
+    let script = String::from_utf8_lossy(&script);
+    if context.json {
+        let shell = args.shell.to_string();
+        let schema = "updraft.completions/1";
+        context.print_json(&CompletionsOutput { schema, shell, script: &script })?;
+    } else {
+        context.emit(&script)?;
+    }
     Ok(Exit::Done)
 }
 
 pub(super) fn schema(context: &Context, args: &SchemaArgs) -> Result<Exit, CommandError> {
-    let schema = args
-        .format
-        .schema()
-        .map_err(|error| CommandError::Failed(format!("failed to make the schema: {error}")))?;
-    context.emit(&schema)?;
+    if context.json {
+        // It is an object, and is printed as every other one.
+        context.print_json(&args.format.made())?;
+    } else {
+        let schema = args.format.schema();
+        let failed = |error| CommandError::Failed(format!("failed to make the schema: {error}"));
+        context.emit(&schema.map_err(failed)?)?;
+    }
     Ok(Exit::Done)
 }

@@ -1,7 +1,7 @@
 //! Small pieces of sentences, and lines that fit a terminal.
 
 use crate::base::layout;
-pub(super) use crate::workflow::words::{count, list, range, shell};
+pub(super) use crate::workflow::words::{count, list, shell};
 
 /// The text, or its beginning with dots if it has more characters.
 pub(super) fn shorten(text: &str, width: usize) -> String {

@@ -10,6 +10,7 @@ use super::slots::{self, FleetTable, SlotProblem, geodetic};
 use super::start::{ClockSpread, clocks};
 use super::telemetry::{Drone, SILENT_AFTER, Telemetry};
 use crate::base::layout;
+use crate::base::names::{listed, ranges};
 use crate::link::clock::Micros;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -399,6 +400,26 @@ impl Look<'_> {
     }
 }
 
+/// Reasons of drones, each once, with all drones that it is true of: `drones 1-12 and 14 (slots 1-13): no GPS`.
+pub(crate) fn by_reason(reasons: &[(String, u16, &str)]) -> Vec<String> {
+    let mut alike: Vec<(&str, Vec<&str>, Vec<u64>)> = Vec::new();
+    for (drone, slot, why) in reasons {
+        match alike.iter_mut().find(|(known, ..)| known == why) {
+            Some((_, drones, slots)) => {
+                drones.push(drone);
+                slots.push(u64::from(*slot));
+            }
+            None => alike.push((why, vec![drone], vec![u64::from(*slot)])),
+        }
+    }
+    let line = |(why, drones, mut slots): (&str, Vec<&str>, Vec<u64>)| {
+        slots.sort_unstable();
+        let (drone, slot) = if slots.len() > 1 { ("drones", "slots") } else { ("drone", "slot") };
+        format!("{drone} {} ({slot} {}): {why}", listed(drones), ranges(&slots))
+    };
+    alike.into_iter().map(line).collect()
+}
+
 impl std::fmt::Display for Preflight {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut lines: Vec<Vec<String>> = Vec::new();
@@ -414,13 +435,17 @@ impl std::fmt::Display for Preflight {
         for line in layout::aligned(&lines) {
             writeln!(f, "{line}")?;
         }
+        let mut reasons = Vec::new();
         for row in &self.rows {
             // Of a silent drone nothing else is known either.
             let silent = row.cells.first().is_some_and(|cell| cell.text == SILENT);
             let shown = if silent { 1 } else { row.cells.len() };
             for why in row.cells.iter().take(shown).filter_map(|cell| cell.no_go.as_deref()) {
-                writeln!(f, "NO-GO drone {} (slot {}): {why}", row.drone, row.slot)?;
+                reasons.push((row.drone.to_string(), row.slot, why));
             }
+        }
+        for line in by_reason(&reasons) {
+            writeln!(f, "NO-GO {line}")?;
         }
         for why in &self.fleet {
             writeln!(f, "NO-GO: {why}")?;

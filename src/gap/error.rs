@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::left_out::LeftOut;
+use super::left_out::{LeftOut, said_together};
 use crate::effects::EffectError;
 use crate::mission::resolve::MissionError;
 use crate::sim::SimError;
@@ -77,7 +77,10 @@ impl GapError {
     }
 }
 
-/// Reasons one below the other; the first ten.
+/// Causes one below the other; the first ten.
 fn listed(reasons: &[LeftOut]) -> String {
-    reasons.iter().take(10).fold(String::new(), |text, reason| format!("{text}\n  {reason}"))
+    said_together(reasons)
+        .iter()
+        .take(10)
+        .fold(String::new(), |text, reason| format!("{text}\n  {reason}"))
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::base::names::together;
 use crate::base::said::said_in_files;
 
 /// Reason why a log or a drone is not in a comparison, or only in part. In `verdict.json` it stands as its
@@ -59,5 +60,32 @@ impl fmt::Display for LeftOut {
             ),
             Self::Said(text) => f.write_str(text),
         }
+    }
+}
+
+/// These reasons, one line for each; slots with the same reason share one: `slots 1-12, 14 and 16: no steady flight ...`.
+pub fn said_together(reasons: &[LeftOut]) -> Vec<String> {
+    let lines: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+    together("slot", lines.iter().map(String::as_str))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_with_one_reason_are_one_line() {
+        let mut reasons: Vec<_> =
+            (1..=12).chain([16, 14]).map(|slot| LeftOut::NoSteadyFlight { slot }).collect();
+        reasons.insert(3, LeftOut::ConstantPulse { slot: 13, pulse_us: 1500.0 });
+        reasons.push(LeftOut::Said("x.BIN: empty".to_owned()));
+        assert_eq!(
+            said_together(&reasons),
+            [
+                "slots 1-12, 14 and 16: no steady flight of the plan in its log",
+                "slot 13: its pulse is 1500 us in the whole flight: no rotor flies so",
+                "x.BIN: empty",
+            ]
+        );
     }
 }

@@ -26,7 +26,7 @@ mod kept;
 mod lean;
 mod lean_channel;
 mod lean_fit;
-mod left_out;
+pub mod left_out;
 mod make;
 mod map_gain;
 mod measure;

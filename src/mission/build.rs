@@ -153,7 +153,7 @@ fn fence(
     for slot in slots {
         let Some(group) = groups.get(usize::from(slot.group)) else { continue };
         for segment in &group.segments {
-            for point in [segment.from_m, segment.to_m] {
+            for point in [segment.from_m, segment.to_m, segment.turn_m()] {
                 for axis in 0..2 {
                     low[axis] = low[axis].min(slot.home_m[axis] + point[axis]);
                     high[axis] = high[axis].max(slot.home_m[axis] + point[axis]);

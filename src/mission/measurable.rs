@@ -13,7 +13,8 @@ const SAME_SPEED_MPS: f64 = 0.01;
 /// Names of the findings of this check.
 pub const NAMES: [&str; 2] = ["ladder-speeds", "ladder-window"];
 
-/// Warns of segments that the analysis will leave out, and of ladders from which no law can come.
+/// Warns of segments that the analysis will leave out, and of ladders of one speed; a ladder from which no law can come
+/// is an error.
 impl Rule for Plan {
     fn check(&self, collector: &mut Collector) {
         for group in &self.groups {
@@ -115,21 +116,32 @@ fn speeds(plan: &Plan, collector: &mut Collector) {
     if speeds.len() >= MIN_SPEEDS {
         return;
     }
-    let message = match speeds.first() {
-        None => "the ladder has no leg with an analysis window: no law can be fitted".to_owned(),
-        Some(speed) => format!(
-            "all legs of the ladder have the same speed, {:.2} m/s: no law can be fitted to fewer than {MIN_SPEEDS} speeds",
-            *speed as f64 * SAME_SPEED_MPS
-        ),
+    let counted = |found: Finding| Finding {
+        value: Some(speeds.len() as f64),
+        limit: Some(MIN_SPEEDS as f64),
+        ..found
     };
-    let remedy = "fly legs at two speeds or more; the paper's ladder has seven";
+    let remedy = "fly legs at two speeds or more, each long enough for its window; the paper's ladder has \
+                  seven";
     collector.add(
         0,
-        Finding {
-            value: Some(speeds.len() as f64),
-            limit: Some(MIN_SPEEDS as f64),
-            ..warning("ladder-speeds", message, remedy)
-        },
+        counted(match speeds.first() {
+            // What is flown for a law must be able to give one.
+            None => Finding::new(
+                Severity::Error,
+                "ladder-speeds",
+                "the ladder has no leg with an analysis window: no law can be fitted".to_owned(),
+                remedy,
+            ),
+            Some(speed) => {
+                let speed_mps = *speed as f64 * SAME_SPEED_MPS;
+                let message = format!(
+                    "all legs of the ladder have the same speed, {speed_mps:.2} m/s: a straight line is all \
+                     that can be fitted to fewer than {MIN_SPEEDS} speeds"
+                );
+                warning("ladder-speeds", message, remedy)
+            }
+        }),
     );
 }
 

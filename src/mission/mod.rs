@@ -16,6 +16,7 @@ mod source;
 pub mod steps;
 pub mod template;
 pub mod to_show;
+pub mod too_fast;
 pub mod window;
 
 #[cfg(test)]

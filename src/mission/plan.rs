@@ -160,6 +160,24 @@ pub struct Segment {
     pub calibrates_wind: bool,
 }
 
+impl Segment {
+    /// Farthest point of a ramp on each axis, relative to home, show frame, m: where its velocity changes its sign, the
+    /// ramp leads beyond both of its ends. The end where there is no such point.
+    pub(super) fn turn_m(&self) -> [f64; 3] {
+        let Some(from_mps) = self.from_velocity_mps else { return self.to_m };
+        let lasts_s = self.end_ms.saturating_sub(self.start_ms) as f64 / 1000.0;
+        let mut turn_m = self.to_m;
+        for (axis, turn_m) in turn_m.iter_mut().enumerate() {
+            let (before, after) = (from_mps[axis], self.velocity_mps[axis]);
+            if before * after < 0.0 {
+                let until_s = lasts_s * before / (before - after);
+                *turn_m = self.from_m[axis] + 0.5 * before * until_s;
+            }
+        }
+        turn_m
+    }
+}
+
 /// Kind of a segment.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,

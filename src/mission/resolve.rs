@@ -195,6 +195,7 @@ pub fn resolve_text(
 }
 
 fn one_flight(path: &str, text: &str, overrides: &[Override]) -> Result<Mission, MissionError> {
+    let overrides = &without_own_name(text, overrides);
     let (flight, used) = resolve_flight(path, text, overrides)?;
     if let Some(key) = unused(overrides, &used) {
         return Err(MissionError::Override {
@@ -208,6 +209,20 @@ fn one_flight(path: &str, text: &str, overrides: &[Override]) -> Result<Mission,
         campaign_text: None,
         flights: vec![flight],
     })
+}
+
+/// Overrides without the flight's own name before the key, which tells the flights of a campaign apart.
+fn without_own_name(text: &str, overrides: &[Override]) -> Vec<Override> {
+    let table = parse::toml::<Table>(text).unwrap_or_default();
+    let name = table.get("name").and_then(Toml::as_str).unwrap_or_default();
+    let is_key = |first: &str| table.contains_key(first);
+    let own = |item: &Override| match item.key.split_once('.') {
+        Some((first, rest)) if first == name && !is_key(first) => {
+            Override { key: rest.to_owned(), value: item.value.clone() }
+        }
+        _ => item.clone(),
+    };
+    overrides.iter().map(own).collect()
 }
 
 fn campaign_of(

@@ -109,7 +109,9 @@ impl Source<'_> {
             Quantity::Reference(_) => &[],
         };
         if list.is_empty() {
-            return Err(self.error(span_of(found), format!("{what} must not be empty")));
+            return Err(self
+                .error(span_of(found), format!("this list has no {what}"))
+                .with_help("give one number or more, for example [0.5, 1.0, 1.5]"));
         }
         list.iter()
             .map(|value| self.checked(*value, span_of(found), what, unit, range.clone()))

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use super::gap_parts::first_gap;
 use super::gap_words::{in_field, kind, left_over, lost, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
-use super::text::{clean, count, fixed, reduced};
+use super::text::{clean, count, fixed, prose_width, reduced};
 use crate::base::layout;
 use crate::gap::Verdict;
+use crate::gap::left_out::said_together;
 use crate::gap::verdict::{Detectable, Finding, Shrink, Step};
 use crate::gap::words::{phrase, short};
 
@@ -29,7 +30,7 @@ struct Page {
 impl Page {
     /// A paragraph, broken between words; later lines are indented.
     fn say(&mut self, style: &str, content: &str, indent: usize) {
-        for line in wrapped(&clean(content), self.width, indent) {
+        for line in wrapped(&clean(content), prose_width(self.width), indent) {
             self.line(style, &line);
         }
     }
@@ -71,7 +72,7 @@ pub fn gap_summary(verdict: &Verdict, width: usize, color: bool) -> String {
     if !verdict.data.left_out.is_empty() {
         page.line("", "");
         page.say(YELLOW, &format!("Left out ({})", verdict.data.left_out.len()), 0);
-        for reason in verdict.data.left_out.iter().take(20) {
+        for reason in said_together(&verdict.data.left_out) {
             page.say("", &format!("  {reason}"), 4);
         }
     }

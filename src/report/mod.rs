@@ -73,6 +73,7 @@ pub use sensitivity_terminal::sensitivity_summary;
 pub use study_page::render_study;
 pub use study_terminal::study_summary;
 pub use terminal::terminal_summary;
+pub use text::NO_EDGE;
 
 /// Name of the page in the report's folder.
 pub const PAGE_FILE: &str = "index.html";

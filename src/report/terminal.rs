@@ -19,7 +19,7 @@ use super::page::capitalised;
 use super::posterior;
 use super::statistics_lines::statistics_lines;
 use super::table::{Align, Column, column, lines};
-use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
+use super::text::{NONE, clean, count, fixed, prose_width, purpose, shortened, signed, usable};
 
 /// The table of drones shows no more; all are in the report.
 const DRONE_LIMIT: usize = 64;
@@ -79,7 +79,7 @@ impl Output {
     /// A line that may be longer than the terminal, broken at spaces.
     fn wrapped(&mut self, style: &str, indent: &str, text: &str) {
         // A word longer than the line (a path, say) is broken: nothing is left out.
-        let options = layout::options(self.width.max(layout::columns(indent) + 10))
+        let options = layout::options(prose_width(self.width).max(layout::columns(indent) + 10))
             .initial_indent(indent)
             .subsequent_indent(indent);
         for line in layout::wrapped(text, options) {

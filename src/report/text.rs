@@ -26,6 +26,16 @@ pub(super) fn clean(text: &str) -> String {
     plain(text).into_owned()
 }
 
+/// Width of files and pipes, columns: tables are whole there, and prose is as wide as on a terminal.
+pub const NO_EDGE: usize = 10_000;
+/// Widest line of prose where there is no edge, columns.
+const WIDEST_PROSE: usize = 100;
+
+/// Width at which prose is broken.
+pub(super) fn prose_width(width: usize) -> usize {
+    if width >= NO_EDGE { WIDEST_PROSE } else { width }
+}
+
 /// [`clean`] cut to `limit` columns of a terminal with an ellipsis.
 pub(super) fn shortened(text: &str, limit: usize) -> String {
     let text = clean(text);

@@ -9,7 +9,7 @@ use super::shows::campaign_files;
 use super::shows::load::{Loaded, load_shows};
 use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
-use crate::check::{CheckInput, CheckReport, NAMES, Options, Severity, check};
+use crate::check::{CheckInput, CheckReport, Finding, NAMES, Options, Severity, causes, check};
 use crate::mission::Plan;
 use crate::mission::measurable;
 use crate::show::Show;
@@ -164,19 +164,39 @@ pub fn allowed<'a>(
     found
 }
 
-/// Reports the findings to the host, errors before warnings; each begins with its level.
-pub fn say_findings(host: &dyn Host, report: &CheckReport, allow: &[String]) {
-    for finding in &report.findings {
+/// Reports the findings to the host, errors before warnings, one line for each cause, or for `each` finding;
+/// each begins with its level.
+pub fn say_findings(host: &dyn Host, report: &CheckReport, allow: &[String], each: bool) {
+    let say = |finding: &Finding, text: String| {
         let allowed = allow.iter().any(|name| name == finding.check);
         if finding.severity == Severity::Error && allowed {
-            host.insist(&format!("allowed: {finding}"));
+            host.insist(&format!("allowed: {text}"));
         } else {
-            host.insist(&finding.to_string());
+            host.insist(&text);
+        }
+    };
+    if each {
+        report.findings.iter().for_each(|finding| say(finding, finding.to_string()));
+    } else {
+        for cause in causes(&report.findings) {
+            if let Some(first) = cause.first() {
+                say(first, cause.to_string());
+            }
         }
     }
     for (check, count) in report.counts.iter().filter(|(_, count)| count.omitted > 0) {
         host.insist(&format!("{check}: and {} more", count.omitted));
     }
+}
+
+/// Causes of errors that were not allowed, one line each.
+pub fn refusals(report: &CheckReport, allow: &[String]) -> Vec<String> {
+    let counts = |finding: &Finding| {
+        finding.severity == Severity::Error && !allow.iter().any(|name| name == finding.check)
+    };
+    let causes = causes(&report.findings);
+    let refused = causes.iter().filter(|cause| cause.first().is_some_and(counts));
+    refused.map(ToString::to_string).collect()
 }
 
 /// Verdict in words: `Safe`, `Not safe`, `Safe apart from 196 allowed findings (velocity-step:

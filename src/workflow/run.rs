@@ -116,7 +116,7 @@ pub fn fly_campaign(
         let show = flight.plan.to_show();
         let report =
             checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, findings_per_check);
-        say_findings(host, &report, &[]);
+        say_findings(host, &report, &[], false);
         if !is_safe(&report, &[]) {
             host.insist("Nothing was flown: the show is not safe as it is");
             return Ok(Flown { ending: Ending::NoGo, lock: None });

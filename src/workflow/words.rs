@@ -30,14 +30,6 @@ pub(crate) fn list(names: &[&str]) -> String {
     }
 }
 
-/// Names that say the same thing: `Drone 1`, `Drone 1 and Drone 2`, `Drone 1 to Drone 49 (49)`.
-pub(crate) fn range(names: &[&str]) -> String {
-    match names {
-        [first, _, .., last] => format!("{first} to {last} ({})", names.len()),
-        few => list(few),
-    }
-}
-
 /// UTC of a GPS time: `12:34:56 UTC`.
 pub(crate) fn time_of_day(time: GpsTime) -> String {
     let seconds = time.to_unix_ms().div_euclid(1000).rem_euclid(86_400);

@@ -10,6 +10,7 @@ mod campaign;
 mod check;
 mod cli;
 mod cluster;
+mod docs;
 mod effects;
 mod firmware;
 mod fleet;

@@ -6,13 +6,14 @@
 //! of the motors, and lands early when the show ends in a vertical descent.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::bezier::Scalar;
 use super::trajectory::{Piece, Trajectory};
 
 /// Generation of the show firmware, which decides how a trajectory is read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub enum Firmware {
     /// CMCopter-4.4, with libskybrush 1.9.
     #[default]
@@ -53,7 +54,7 @@ impl Default for DeriveParams {
 }
 
 /// Schedule and acceptance of one drone's show, as its firmware derives them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Derived {
     /// Instant at which the trajectory is `takeoff_alt_m` above its start, show time, s; `None` if
     /// it never is.

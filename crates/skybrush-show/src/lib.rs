@@ -57,7 +57,7 @@ pub struct Show {
 
 /// One polygon of a geofence. Drones must stay inside every inclusion zone and outside every exclusion
 /// zone.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct FenceZone {
     /// Whether drones must stay inside it (else: outside).
     pub is_inclusion: bool,

@@ -2,13 +2,14 @@
 //! show as it is flown with it.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::skyb::{self, Quantisation, SkybError, SkybOptions};
 use super::{Show, ShowDrone};
 
 /// The `.skyb` file of one drone, in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DroneQuantisation {
     /// Label of the drone.
     pub name: String,

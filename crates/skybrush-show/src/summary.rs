@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::derive::{DeriveParams, Derived, Firmware, derive};
@@ -15,7 +16,7 @@ use super::{FenceZone, Show, ShowDrone};
 const LIGHT_LINES: usize = 20;
 
 /// A show in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ShowSummary {
     /// Identifier of the show, if the file has one.
     pub id: Option<String>,
@@ -41,7 +42,7 @@ pub struct ShowSummary {
 }
 
 /// Largest speeds, m/s. Exact for straight pieces, an upper bound for curves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Speeds {
     /// Largest horizontal speed, m/s.
     pub horizontal_mps: f64,
@@ -52,7 +53,7 @@ pub struct Speeds {
 }
 
 /// One drone in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DroneSummary {
     /// Label of the drone.
     pub name: String,
@@ -82,7 +83,7 @@ pub struct DroneSummary {
 }
 
 /// A `.skyb` file for people.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SkybSummary {
     /// Version of the format.
     pub version: u8,

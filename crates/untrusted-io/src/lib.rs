@@ -2,6 +2,7 @@
 
 pub mod crc;
 pub mod file;
+pub mod names;
 pub mod number;
 pub mod owner;
 #[cfg(feature = "parse")]

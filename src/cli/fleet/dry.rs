@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::StepArgs;
@@ -12,8 +13,8 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::Action;
 use crate::workflow::fleet::{dry, server};
 
-#[derive(Serialize)]
-struct DryOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct DryOutput {
     schema: &'static str,
     drones: BTreeMap<String, Vec<String>>,
 }

@@ -266,7 +266,8 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
     with_crew(context, &args.step, |crew| {
         let (refused, ending) = steps::upload(crew, args.wish())?;
         if context.json {
-            context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
+            let output = tables::UploadOutput::new(&crew.table, &refused);
+            context.print_json(&tables::FleetUpload::OverLinks(output))?;
         }
         Ok(ending.into())
     })

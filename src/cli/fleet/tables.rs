@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::server;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::Aborted;
@@ -17,7 +19,7 @@ use crate::link::traffic::Traffic;
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::preflight::PreflightOutput;
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct StatusRow {
     drone: DroneId,
     nearest_slot: Option<u16>,
@@ -36,7 +38,7 @@ struct StatusRow {
 }
 
 /// What went through a network.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct NetworkRow {
     network: u16,
     bytes_in: u64,
@@ -52,8 +54,8 @@ struct NetworkRow {
     noise_bytes: u64,
 }
 
-#[derive(Serialize)]
-struct StatusOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct StatusOutput {
     schema: &'static str,
     drones: Vec<StatusRow>,
     networks: Vec<NetworkRow>,
@@ -107,7 +109,8 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     if context.json {
         let networks = networks(crew);
         let schema = "updraft.fleet-status/1";
-        context.print_json(&StatusOutput { schema, drones: rows, networks })?;
+        let output = StatusOutput { schema, drones: rows, networks };
+        context.print_json(&FleetStatus::OverLinks(output))?;
         return Ok(Exit::Done);
     }
     let mut text = String::from(
@@ -164,13 +167,13 @@ pub(in crate::cli) fn preflight(
 }
 
 /// What an upload prints under `--json`.
-#[derive(Serialize)]
-pub(super) struct UploadOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct UploadOutput {
     schema: &'static str,
     drones: Vec<UploadRow>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct UploadRow {
     slot: u16,
     drone: DroneId,
@@ -191,14 +194,30 @@ impl UploadOutput {
     }
 }
 
+/// What a look at the fleet prints under `--json`: over the drones' own links, or through Skybrush Server.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(in crate::cli) enum FleetStatus<'a> {
+    OverLinks(StatusOutput),
+    ThroughServer(server::StatusOutput<'a>),
+}
+
+/// What an upload prints under `--json`: over the drones' own links, or through Skybrush Server.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(in crate::cli) enum FleetUpload {
+    OverLinks(UploadOutput),
+    ThroughServer(server::UploadOutput),
+}
+
 /// What an abort prints under `--json`.
-#[derive(Serialize)]
-pub(super) struct EndOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct EndOutput {
     schema: &'static str,
     drones: Vec<EndRow>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct EndRow {
     drone: DroneId,
     confirmed: bool,

@@ -5,6 +5,7 @@ mod next;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::context::Context;
@@ -96,8 +97,8 @@ const WIDTH: usize = 100;
 const MIN_WIDTH: usize = 40;
 
 /// What `--json` prints.
-#[derive(Serialize)]
-struct GapOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct GapOutput<'a> {
     schema: &'static str,
     model: PathBuf,
     report: PathBuf,
@@ -114,7 +115,8 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         let (model, report) = (model.clone(), page.clone());
         context.print_json(&GapOutput { schema: "updraft.gap/1", model, report, verdict })?;
     } else {
-        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
+        let width =
+            context.width.map_or(report::NO_EDGE, |columns| columns.clamp(MIN_WIDTH, WIDTH));
         context.print(&report::gap_summary(verdict, width, context.color))?;
     }
     context.result(page)?;

@@ -5,6 +5,7 @@ use std::io::IsTerminal as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::ask;
@@ -48,8 +49,8 @@ pub(super) struct ImportArgs {
     again: bool,
 }
 
-#[derive(Serialize)]
-struct ImportOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct ImportOutput {
     schema: &'static str,
     flights: Vec<FlightRow>,
     /// File names, with their flight's folder in a campaign of several flights.
@@ -60,7 +61,7 @@ struct ImportOutput {
     missing_slots: Vec<u16>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct FlightRow {
     flight: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,7 +70,7 @@ struct FlightRow {
     missing_slots: Vec<u16>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct LogRow {
     card: PathBuf,
     #[serde(skip_serializing_if = "Option::is_none")]

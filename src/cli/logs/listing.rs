@@ -1,13 +1,14 @@
 //! List of the logs on the drones, for people and for programs.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::workflow::fleet::output::ListRow;
 
-#[derive(Serialize)]
-struct ListOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct ListOutput {
     schema: &'static str,
     drones: Vec<ListRow>,
 }

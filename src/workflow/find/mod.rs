@@ -20,6 +20,7 @@ use self::physics::density;
 pub(crate) use self::physics::{is_of_simulator, sag};
 use super::error::WorkflowError;
 use super::hashes::Hashes;
+use super::shows::load::has_extension;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;
@@ -114,6 +115,13 @@ impl Work {
 ///
 /// If there is nothing, or a file that was named cannot be read.
 pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), WorkflowError> {
+    if has_extension(path, "csv") && path.is_file() {
+        return Err(WorkflowError::Usage(format!(
+            "{} is a table, not a log: say in a mapping file what its columns are, and give that with --csv \
+             (docs/csv.md)",
+            path.shown()
+        )));
+    }
     if path.is_dir() && campaign::is_campaign(path) {
         let index = campaign::index_path(path);
         if index.is_file() && work.title.is_empty() {

@@ -182,7 +182,7 @@ impl FlightOutput {
 }
 
 /// A drone's logs, or why they are not known.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct ListRow {
     pub(crate) drone: String,
     /// None: no slot is near.
@@ -194,7 +194,7 @@ pub(crate) struct ListRow {
 }
 
 /// A log on a drone.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct ListedLog {
     pub(crate) number: u16,
     pub(crate) bytes: u64,

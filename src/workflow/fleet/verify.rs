@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::base::file::FileError;
@@ -15,7 +16,7 @@ use crate::log::Log;
 use crate::workflow::error::WorkflowError;
 
 /// A log at home.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct VerifyRow {
     /// Name of its flight.
     pub(crate) flight: String,

@@ -23,7 +23,8 @@ use crate::blind::record;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::to_json;
 use crate::effects::select::resolved;
-use crate::gap::{Explained, Options, Verdict};
+use crate::gap::left_out::said_together;
+use crate::gap::{Explained, GapError, Options, Verdict};
 use crate::report::{self, Provenance};
 use crate::vehicle::Vehicle;
 
@@ -76,6 +77,7 @@ impl Compared {
 /// If there is nothing to compare, the model cannot be used, or the folder holds something else.
 pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError> {
     let (found, others) = measured(host, request)?;
+    let other_flights = if request.flight.is_none() { names(&others) } else { Vec::new() };
     let vehicle = model_of(request, &found)?;
     // Before anything is flown: what is wrong with the model is the file's fault, not the flight's.
     resolved(&vehicle).map_err(|error| {
@@ -94,7 +96,8 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
         ));
     }
     let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
-    let mut explained = compare(&both, &vehicle, &request.options)?;
+    let mut explained = compare(&both, &vehicle, &request.options)
+        .map_err(|error| with_flights(error, &found.name, &other_flights))?;
     explained.verdict.cautions.extend(unplanned(request, &found, &vehicle));
     host.check_stop()?;
     create_folder(&folder)?;
@@ -107,10 +110,32 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
         Provenance { seed: Some(request.options.seed), ..provenance(host, &work, settings) };
     explained.verdict.data.logs_sha256 = logs_sha256(&work)?;
     let page = write(&folder, &explained, &provenance)?;
-    for reason in &explained.verdict.data.left_out {
-        host.warn(&reason.to_string());
+    for reason in said_together(&explained.verdict.data.left_out) {
+        host.warn(&reason);
     }
     Ok(Compared { verdict: explained.verdict, model: folder.join(MODEL), page })
+}
+
+/// Names of flights that have logs.
+fn names(flights: &[Found]) -> Vec<String> {
+    let usable = flights.iter().filter(|flight| !flight.logs.is_empty());
+    usable.map(|flight| flight.name.clone()).collect()
+}
+
+/// An error of a flight without enough steady flight, with the others that nobody has asked for.
+fn with_flights(error: WorkflowError, flight: &str, others: &[String]) -> WorkflowError {
+    let is_of_flight = matches!(
+        error,
+        WorkflowError::Gap(GapError::NothingCommon | GapError::NothingMeasured { .. })
+    );
+    if !is_of_flight || others.is_empty() {
+        return error;
+    }
+    let options: Vec<String> = others.iter().map(|name| format!("--flight {name}")).collect();
+    WorkflowError::Nothing(format!(
+        "{error}\nThat is the flight {flight}; to compare another one: {}",
+        options.join(" or ")
+    ))
 }
 
 /// SHA-256 of the logs that were compared, by which a verdict is known as theirs.
@@ -204,4 +229,24 @@ fn write(
     // Last: who finds a verdict finds the others as well.
     write_whole(&folder.join(VERDICT), &json)?;
     Ok(pages.join(report::PAGE_FILE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_flights_are_named_where_one_has_too_little_steady_flight() {
+        let too_little = || WorkflowError::Gap(GapError::NothingCommon);
+        let others = ["hover".to_owned(), "scan".to_owned()];
+        let text = with_flights(too_little(), "legs", &others).to_string();
+        assert!(text.starts_with(&too_little().to_string()), "{text}");
+        assert!(
+            text.ends_with("legs; to compare another one: --flight hover or --flight scan"),
+            "{text}"
+        );
+        assert_eq!(with_flights(too_little(), "legs", &[]).to_string(), too_little().to_string());
+        let other = WorkflowError::Interrupted;
+        assert!(matches!(with_flights(other, "legs", &others), WorkflowError::Interrupted));
+    }
 }

@@ -134,12 +134,29 @@ pub(crate) fn run(host: &dyn Host, wish: &Wish) -> Result<Proposed, WorkflowErro
                 seed: wish.seed,
             },
         )?;
+        refuse_untold(&next, &before.place)?;
     }
     write_whole(&path, text.as_bytes())?;
     let json = to_json(&next)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
     write_whole(&folder.join(RESULT), &json)?;
     Ok(Proposed { next, path })
+}
+
+/// Refuses a flight that should have told something at once and told nothing when it was simulated. What needs several
+/// flights is not expected of one.
+fn refuse_untold(next: &Next, place: &Path) -> Result<(), WorkflowError> {
+    let at_once = || next.questions.iter().filter(|asked| asked.reached);
+    let verified = || at_once().flat_map(|asked| &asked.verified);
+    let flown = verified().count();
+    if flown == 0 || verified().any(|answer| answer.told) {
+        return Ok(());
+    }
+    Err(WorkflowError::Nothing(format!(
+        "{}: the best flight that was found was simulated with each answer, and told it in 0 of {flown} flights; \
+         nothing was written (--no-verify writes it all the same, --longest allows a longer one)",
+        place.shown()
+    )))
 }
 
 /// The flight that was compared, and what came of it.

@@ -5,6 +5,7 @@ mod record;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::record::{changed_logs, prepare, taken_down, write_record};
@@ -14,6 +15,7 @@ use super::host::Host;
 use super::share::numbers;
 use super::slots::SlotSet;
 use super::words;
+use crate::base::names::together;
 use crate::base::plain::Shown as _;
 use crate::base::shard::Share;
 use crate::campaign::{FlightFolder, FlightRecord};
@@ -82,7 +84,7 @@ pub fn uniform_mps(wind_mps: f64, from_deg: f64, updraft_mps: f64) -> [f64; 3] {
 }
 
 /// Outcome of one simulated flight.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Flown {
     /// Name of the flight.
     pub flight: String,
@@ -367,8 +369,8 @@ pub(crate) fn settle(
     };
     host.check_stop()?;
     let kept = wanted.len() - open.len();
-    for error in &failed {
-        host.warn(error);
+    for error in together("drone", failed.iter().map(String::as_str)) {
+        host.warn(&error);
     }
     let word = if kept == wanted.len() { "Found" } else { "Flew" };
     host.say(&format!(

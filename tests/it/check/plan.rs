@@ -111,11 +111,12 @@ fn legs_without_a_window_and_ladders_of_one_speed_are_told() {
         named(&short, "ladder-speeds"),
         ["the ladder has no leg with an analysis window: no law can be fitted"]
     );
+    assert!(!short.passed() && whole.passed());
     let one = few(&["speeds_mps=[1.5, 1.5]"]);
     assert_eq!(
         named(&one, "ladder-speeds"),
         [
-            "all legs of the ladder have the same speed, 1.50 m/s: no law can be fitted to fewer than 2 speeds"
+            "all legs of the ladder have the same speed, 1.50 m/s: a straight line is all that can be fitted to fewer than 2 speeds"
         ]
     );
     assert_eq!(named(&few(&["speeds_mps=[1.5, 2]"]), "ladder-speeds"), [""; 0]);
@@ -331,6 +332,8 @@ fn equal_warnings_of_many_drones_are_one() {
     let low: Vec<_> = report.findings.iter().filter(|found| found.check == "low-flight").collect();
     assert_eq!(low.iter().map(|found| found.drones.len()).collect::<Vec<_>>(), [1, 9], "{report}");
     let text = report.to_string();
-    assert!(text.contains("warning[low-flight] Drone 1 to Drone 9 (9 drones) at "), "{text}");
+    assert!(text.contains("warning[low-flight] drones 1-10, 2 findings; the worst: "), "{text}");
+    let each = report.each_finding();
+    assert!(each.contains("warning[low-flight] drones 1-9 at "), "{each}");
     assert_eq!(report.counts["low-flight"].warnings, 2);
 }

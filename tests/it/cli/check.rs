@@ -142,14 +142,14 @@ fn a_flight_that_is_gone_is_named() {
 }
 
 #[test]
-fn a_flood_of_findings_is_capped_but_can_be_had() {
+fn a_flood_of_findings_is_one_line_but_can_be_had() {
     let bench = Bench::new();
     let args = ["plan", "calibration", "--grid", "2x10", "--spacing", "1", "-o", "near"];
     bench.expect(0, &[&args[..], SHORT, &["--allow", "distance"]].concat());
     let lines = |ended: &Ended| ended.out.matches("error[distance]").count();
     let few = bench.expect(4, &["check", "near"]);
-    assert_eq!(lines(&few), 5, "{few}");
-    assert!(few.out.contains("\ndistance: and "), "{few}");
+    assert_eq!(lines(&few), 1, "{few}");
+    assert!(few.out.contains("error[distance] drones 1-20, "), "{few}");
     assert!(few.out.contains("(--verbose lists every finding)"), "{few}");
     let all = bench.expect(4, &["check", "near", "--verbose"]);
     assert!(lines(&all) > 20, "{all}");

@@ -198,7 +198,10 @@ fn tables_fit_a_narrow_terminal() {
         let narrow = bench.command(args).env("COLUMNS", "60").output().unwrap();
         let narrow = Ended::of(&narrow);
         assert_eq!(narrow.code, Some(0), "{narrow}");
-        let long: Vec<_> = narrow.out.lines().filter(|line| line.chars().count() > 60).collect();
+        // Examples are copied: they keep their lines.
+        let breaks = |line: &&str| !line.starts_with("  updraft ");
+        let lines = narrow.out.lines().filter(breaks);
+        let long: Vec<_> = lines.filter(|line| line.chars().count() > 60).collect();
         assert!(long.is_empty(), "{args:?}: {long:#?}");
     }
 }

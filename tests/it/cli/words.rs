@@ -108,5 +108,5 @@ fn every_drone_in_counter_phase_is_told_of_its_design_once() {
     assert_eq!(low[0]["drones"].as_array().unwrap().len(), 49, "all of them are named");
     // A defect of one drone is still its own.
     let near = bench.expect(4, &[&args[..], &["--spacing", "2.5"]].concat());
-    assert!(near.err.contains("error[distance] Drone 1 and Drone "), "{}", near.err);
+    assert!(near.err.contains("error[distance] drones 1-49, "), "{}", near.err);
 }

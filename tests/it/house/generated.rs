@@ -7,6 +7,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum as _;
 use updraft::campaign::write::{FlightFiles, folders, write_index};
 use updraft::cli::tools::Format;
 use updraft::mission::resolve::resolve;
@@ -21,43 +22,8 @@ fn root() -> &'static Path {
 
 #[test]
 fn json_schemas_are_current() {
-    for (format, name) in [
-        (Format::Plan, "plan"),
-        (Format::Campaign, "campaign"),
-        (Format::Flight, "flight"),
-        (Format::Analysis, "analysis"),
-        (Format::Study, "study"),
-        (Format::Cell, "cell"),
-        (Format::Sensitivity, "sensitivity"),
-        (Format::SensitivityItem, "sensitivity-item"),
-        (Format::Vehicle, "vehicle"),
-        (Format::Logs, "logs"),
-        (Format::Start, "start"),
-        (Format::Fleet, "fleet"),
-        (Format::Changes, "changes"),
-        (Format::Preflight, "preflight"),
-        (Format::Fly, "fly"),
-        (Format::Verdict, "verdict"),
-        (Format::Blind, "blind"),
-        (Format::BlindFlight, "blind-flight"),
-        (Format::BlindTruth, "blind-truth"),
-        (Format::BlindGame, "blind-game"),
-        (Format::BlindRecord, "blind-record"),
-        (Format::BlindVerify, "blind-verify"),
-        (Format::Next, "next"),
-        (Format::Hidden, "hidden"),
-        (Format::Items, "items"),
-        (Format::AnalysisRecord, "analysis-record"),
-        (Format::Cluster, "cluster"),
-        (Format::ClusterScript, "cluster-script"),
-        (Format::ClusterSubmit, "cluster-submit"),
-        (Format::ClusterStatus, "cluster-status"),
-        (Format::ClusterCancel, "cluster-cancel"),
-        (Format::Shard, "shard"),
-        (Format::AnalyzeEach, "analyze-each"),
-        (Format::Archive, "archive"),
-        (Format::ArchiveIndex, "archive-index"),
-    ] {
+    for format in Format::value_variants() {
+        let name = format.to_possible_value().unwrap().get_name().to_owned();
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();
         if update() {

@@ -1,10 +1,11 @@
-//! What holds the house together: its layers, what is generated, the fuzzer's corpus.
+//! What holds the house together: its layers, what is generated, the fuzzer's corpus, the package.
 
 mod architecture;
 mod doc_comments;
 mod fuzz_corpus;
 mod generated;
 mod layers;
+mod package;
 mod physics_note;
 
 use std::fs;

@@ -1,5 +1,6 @@
 //! Definitions: the description of an effect for people and programs.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::role::Role;
@@ -101,7 +102,7 @@ pub struct Parameter {
 }
 
 /// Signals that a closed form looks at; the fields of [`super::Signals`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Signal {
     /// Vertical speed relative to the air, m/s up.
@@ -151,7 +152,7 @@ impl Signal {
 }
 
 /// Place in the simulator at which an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Hook {
@@ -184,7 +185,7 @@ impl Hook {
 }
 
 /// Effects that a flight of the paper's protocol cannot tell apart (they leave the same trace).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
     /// Odd and linear in the vertical air speed.

@@ -17,6 +17,7 @@
 //!   [`TOLERANCE_MPS`] or [`TOLERANCE_MPS2`]; the values in the report are exact.
 
 pub mod bernstein;
+mod cause;
 mod curve;
 mod distance;
 mod endurance;
@@ -41,6 +42,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use cause::{Cause, causes};
 pub use firmware::Firmware;
 pub use report::{CheckReport, Collector, Count, Finding, Margin, Severity};
 

@@ -1,12 +1,15 @@
 //! Findings of the checks, for people and for programs.
 
-use std::collections::BTreeMap;
-use std::fmt;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::{self, Write as _};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use untrusted_io::names::listed;
 use untrusted_io::number::{brief, fixed};
+
+use super::cause::causes;
 
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -131,6 +134,20 @@ impl CheckReport {
         self.errors() == 0
     }
 
+    /// The report with every finding on a line of its own, where its display has one line for each cause.
+    pub fn each_finding(&self) -> String {
+        let mut text = String::new();
+        let mut remedies: BTreeSet<(&str, &str)> = BTreeSet::new();
+        for finding in &self.findings {
+            let _ = writeln!(text, "{finding}");
+            if !finding.remedy.is_empty() && remedies.insert((finding.check, finding.remedy)) {
+                let _ = writeln!(text, "  help: {}", finding.remedy);
+            }
+        }
+        let rest = Self { findings: Vec::new(), ..self.clone() };
+        text + &rest.to_string()
+    }
+
     /// The margin of a check, by its name.
     pub fn margin(&self, check: &str) -> Option<&Margin> {
         self.margins.iter().find(|margin| margin.check == check)
@@ -153,32 +170,36 @@ impl fmt::Display for Quantity {
 }
 
 fn among(drones: &[String]) -> String {
-    match drones {
-        [] => String::new(),
-        [one] => one.clone(),
-        [one, other] => format!("{one} and {other}"),
-        [one, .., last] => format!("{one} to {last} ({} drones)", drones.len()),
+    listed(drones.iter().map(String::as_str))
+}
+
+impl Finding {
+    /// `error[fence]`.
+    pub(super) fn head(&self) -> String {
+        let severity = match self.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        format!("{severity}[{}]", self.check)
+    }
+
+    /// ` at 1.000..2.000 s`; empty where it is not about a moment.
+    pub(super) fn when(&self) -> String {
+        match (self.time_s, self.end_s) {
+            (Some(from), Some(to)) if to - from >= 0.0005 => format!(" at {from:.3}..{to:.3} s"),
+            (Some(from), _) => format!(" at {from:.3} s"),
+            (None, _) => String::new(),
+        }
     }
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let severity = match self.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-        };
-        write!(f, "{severity}[{}]", self.check)?;
+        f.write_str(&self.head())?;
         if !self.drones.is_empty() {
             write!(f, " {}", among(&self.drones))?;
         }
-        match (self.time_s, self.end_s) {
-            (Some(from), Some(to)) if to - from >= 0.0005 => {
-                write!(f, " at {from:.3}..{to:.3} s")?;
-            }
-            (Some(from), _) => write!(f, " at {from:.3} s")?,
-            (None, _) => {}
-        }
-        write!(f, ": {}", self.message)
+        write!(f, "{}: {}", self.when(), self.message)
     }
 }
 
@@ -210,13 +231,13 @@ impl fmt::Display for Margin {
 
 impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut remedies: BTreeMap<(&str, &str), ()> = BTreeMap::new();
-        for finding in &self.findings {
-            writeln!(f, "{finding}")?;
-            if !finding.remedy.is_empty()
-                && remedies.insert((finding.check, finding.remedy), ()).is_none()
-            {
-                writeln!(f, "  help: {}", finding.remedy)?;
+        let mut remedies: BTreeSet<(&str, &str)> = BTreeSet::new();
+        for cause in causes(&self.findings) {
+            writeln!(f, "{cause}")?;
+            for finding in cause.findings() {
+                if !finding.remedy.is_empty() && remedies.insert((finding.check, finding.remedy)) {
+                    writeln!(f, "  help: {}", finding.remedy)?;
+                }
             }
         }
         for (check, count) in &self.counts {

@@ -1,5 +1,6 @@
 //! Playing a light program, and explaining it.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Command, Decoder, Rgb, TICK_MS, with_final_set};
@@ -10,7 +11,7 @@ const MAX_COMMANDS: usize = 1_000_000;
 const MAX_LOOPS: usize = 4;
 
 /// A light program in words.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Explanation {
     /// One line per command: offset and what it does.
     pub lines: Vec<String>,

@@ -9,6 +9,7 @@ mod units;
 mod write;
 mod yaw;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -28,7 +29,7 @@ pub const MAX_FILE: usize = 8 << 20;
 pub(crate) const TRAJECTORY_HEADER: usize = 9;
 
 /// Types of blocks in a `.skyb` file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BlockKind {
     /// The trajectory, one per file.

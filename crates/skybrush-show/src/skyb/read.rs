@@ -1,6 +1,7 @@
 //! Reader of `.skyb` files.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::units::{to_m, value_count};
@@ -35,7 +36,7 @@ pub struct SkybContents {
 }
 
 /// Kind and place of a block in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct BlockInfo {
     /// Kind of the block.
     pub kind: BlockKind,
@@ -48,7 +49,7 @@ pub struct BlockInfo {
 }
 
 /// One record of the event list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Event {
     /// Show time of the event, ms.
     pub time_ms: u32,

@@ -1,6 +1,7 @@
 //! Conversion of metres to whole units and back, and its loss of precision.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bezier::Scalar;
@@ -10,7 +11,7 @@ const SAME_M: f64 = 1e-9;
 
 /// Largest deviation that whole units cause. Exact for straight pieces; for curves an upper bound
 /// (from the control points of the difference).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Quantisation {
     /// Largest deviation of position, m.
     pub max_position_m: f64,

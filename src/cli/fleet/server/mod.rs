@@ -4,8 +4,10 @@ mod options;
 
 use std::collections::BTreeSet;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::tables::{FleetStatus, FleetUpload};
 use crate::base::layout;
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
@@ -17,8 +19,8 @@ use crate::workflow::fleet::server::{self, Status, StatusRow, Uploaded};
 
 pub(in crate::cli) use options::{of_air, refuse};
 
-#[derive(Serialize)]
-struct StatusOutput<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct StatusOutput<'a> {
     schema: &'static str,
     drones: &'a [StatusRow],
 }
@@ -31,8 +33,15 @@ pub(in crate::cli) fn status(
     wait_s: f64,
 ) -> Result<Exit, CommandError> {
     let Status { drones, problems } = &server::status(context, address, plan, wait_s)?;
+    if drones.is_empty() {
+        for problem in problems {
+            context.warn(problem);
+        }
+        return Err(CommandError::Nothing("the server knows no drone".to_owned()));
+    }
     if context.json {
-        context.print_json(&StatusOutput { schema: "updraft.fleet-status/1", drones })?;
+        let output = StatusOutput { schema: "updraft.fleet-status/1", drones };
+        context.print_json(&FleetStatus::ThroughServer(output))?;
     } else {
         let head = ["drone", "slot", "away m", "mode", "show", "GPS", "battery", "states"];
         let mut lines: Vec<Vec<String>> = vec![head.map(str::to_owned).into()];
@@ -53,19 +62,16 @@ pub(in crate::cli) fn status(
     for problem in problems {
         context.warn(problem);
     }
-    if drones.is_empty() {
-        return Err(CommandError::Nothing("the server knows no drone".to_owned()));
-    }
     Ok(Exit::Done)
 }
 
-#[derive(Serialize)]
-struct UploadOutput {
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct UploadOutput {
     schema: &'static str,
     drones: Vec<UploadRow>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct UploadRow {
     slot: u16,
     drone: String,
@@ -96,7 +102,8 @@ pub(in crate::cli) fn upload(
             reason: refused.get(drone).cloned(),
         };
         let drones = drones.iter().map(row).collect();
-        context.print_json(&UploadOutput { schema: "updraft.upload/1", drones })?;
+        let output = UploadOutput { schema: "updraft.upload/1", drones };
+        context.print_json(&FleetUpload::ThroughServer(output))?;
     }
     Ok(if refused.is_empty() { Exit::Done } else { Exit::Losses })
 }

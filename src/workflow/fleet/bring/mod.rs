@@ -6,6 +6,7 @@ mod watch;
 
 use std::collections::BTreeSet;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::watch::Watching;
@@ -66,7 +67,7 @@ impl Default for Wish {
 }
 
 /// Where a drone's log is in the end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum LogState {
     /// It came.
@@ -78,7 +79,7 @@ pub(crate) enum LogState {
 }
 
 /// What became of a drone's log.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub(crate) struct Brought {
     pub(crate) slot: u16,
     /// None: nobody is known to stand there.

@@ -9,6 +9,7 @@ use crate::fleet::changes::{Change, Changes};
 use crate::fleet::fence::{Fence, fence_of};
 use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
+use crate::fleet::preflight::by_reason;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::upload::{ShowLoad, Upload};
@@ -83,9 +84,12 @@ impl Crew<'_> {
                 }
             }
         }
-        for (drone, complaint) in &unset {
-            let slot = self.table.slot_of(*drone).unwrap_or(0);
-            self.host.warn(&format!("drone {drone} (slot {slot}): {complaint}"));
+        let slot_of = |drone: &DroneId| self.table.slot_of(*drone).unwrap_or(0);
+        let complaints = unset
+            .iter()
+            .map(|(drone, complaint)| (drone.to_string(), slot_of(drone), complaint.as_str()));
+        for line in by_reason(&complaints.collect::<Vec<_>>()) {
+            self.host.warn(&line);
         }
         if may_change {
             let fine = |drone: &DroneId| {
@@ -154,6 +158,7 @@ impl Crew<'_> {
                 refused.entry(drone).or_insert_with(|| why.clone());
             }
         }
+        let mut failed = BTreeMap::new();
         for (drone, outcome) in done {
             match outcome {
                 Ok(loaded) => {
@@ -164,12 +169,17 @@ impl Crew<'_> {
                     self.known.fenced.insert(drone);
                 }
                 Err(error) => {
-                    let slot = self.table.slot_of(drone).unwrap_or(0);
-                    self.host.warn(&format!("drone {drone} (slot {slot}): {error}"));
-                    refused.insert(drone, error.to_string());
+                    failed.insert(drone, error.to_string());
                 }
             }
         }
+        let slot_of = |drone: &DroneId| self.table.slot_of(*drone).unwrap_or(0);
+        let reasons =
+            failed.iter().map(|(drone, why)| (drone.to_string(), slot_of(drone), why.as_str()));
+        for line in by_reason(&reasons.collect::<Vec<_>>()) {
+            self.host.warn(&line);
+        }
+        refused.extend(failed);
         if !self.is_virtual {
             self.host.say(&loaded(count - refused.len(), count, written.len()));
         }

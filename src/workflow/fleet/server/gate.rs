@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::ServedFlight;
 use crate::base::layout;
-use crate::fleet::preflight::{Limits, charge_needed};
+use crate::fleet::preflight::{Limits, by_reason, charge_needed};
 use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
 use crate::skybrush_server::Client;
@@ -136,10 +136,13 @@ impl fmt::Display for Table {
         for line in layout::aligned(&lines) {
             writeln!(f, "{line}")?;
         }
+        let mut reasons = Vec::new();
         for row in &self.rows {
-            for why in &row.no_go {
-                writeln!(f, "NO-GO drone {} (slot {}): {why}", row.drone, row.slot)?;
-            }
+            let each = row.no_go.iter().map(|why| (row.drone.clone(), row.slot, why.as_str()));
+            reasons.extend(each);
+        }
+        for line in by_reason(&reasons) {
+            writeln!(f, "NO-GO {line}")?;
         }
         let ready = self.rows.iter().filter(|row| row.no_go.is_empty()).count();
         let verdict = if self.go() { "GO" } else { "NO-GO" };

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::gate::{Table, cells, gate};
@@ -26,7 +27,7 @@ pub(crate) struct Status {
 }
 
 /// One drone behind a server.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct StatusRow {
     pub(crate) drone: String,
     pub(crate) nearest_slot: Option<u16>,

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -77,7 +78,7 @@ struct Peer {
 
 /// Statistics and state of an instance. Counts are since the program's start, the rest is the
 /// present.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Status {
     /// Address of the firmware that flies the instance.
     pub peer: Option<SocketAddr>,
