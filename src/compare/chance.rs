@@ -1,4 +1,4 @@
-//! What chance alone would do: p-values, many tests at once, and a scale that outliers do not move.
+//! Chance: p-values, many tests at once, and a scale that outliers do not move.
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, StudentsT};
 use statrs::function::erf::erfc;
@@ -24,9 +24,10 @@ pub fn two_sided(z: f64) -> f64 {
     erfc(z.abs() / std::f64::consts::SQRT_2)
 }
 
-/// The same for Student's t; `None` degrees of freedom: a normal value.
+/// Probability of a value of Student's t at least so far from 0, to either side; `None` degrees of freedom: of a normal
+/// value.
 pub fn two_sided_t(t: f64, dof: Option<f64>) -> f64 {
-    let Some(dof) = dof else { return two_sided(t) };
+    let Some(dof) = dof.filter(|_| t.is_finite()) else { return two_sided(t) };
     StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |law| (2.0 * law.sf(t.abs())).min(1.0))
 }
 
@@ -40,6 +41,9 @@ pub fn chi2_above(chi2: f64, dof: usize) -> f64 {
 
 /// Probability of Fisher's F at least so large.
 pub(super) fn f_above(f: f64, dof: f64, dof_of_errors: f64) -> f64 {
+    if !f.is_finite() || f < 0.0 {
+        return f64::NAN;
+    }
     FisherSnedecor::new(dof, dof_of_errors).map_or(f64::NAN, |law| law.sf(f))
 }
 

@@ -10,7 +10,7 @@ use crate::analysis::result::{BentLine, DroneAnalysis, Fit, Laws};
 use crate::base::estimate::Estimate;
 use crate::numeric::extent;
 
-/// Which law is compared.
+/// Choice of the law that is compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LawChoice {
     /// The one that each flight's windows prefer.

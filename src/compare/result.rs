@@ -1,4 +1,4 @@
-//! What a comparison says, as written to `compare.json`.
+//! Words of a comparison, as written to `compare.json`.
 //!
 //! Every change is *other less reference*. Errors are standard errors; p-values are two-sided.
 

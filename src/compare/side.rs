@@ -1,4 +1,4 @@
-//! What is put side by side: a campaign's analysis with what is known of its drones, and which flights and drones of
+//! Sides of a comparison: a campaign's analysis with what is known of its drones, and which flights and drones of
 //! two campaigns belong together.
 
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ pub struct Side {
     pub facts: Vec<FlightFacts>,
 }
 
-/// What a campaign's records say of a flight.
+/// Facts of a flight from its campaign's records.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightFacts {
     /// Airframe of each slot: its system id.

@@ -228,7 +228,10 @@ fn drones_are_known_by_their_airframes_where_both_flights_know_them() {
     let by_airframe = of(&sides(facts(7)));
     assert_eq!(named(&by_airframe), [] as [usize; 0]);
     assert_eq!(by_airframe.laws[0].drones[0].other_slot, Some(2));
-    assert!(!named(&of(&sides(Vec::new()))).is_empty());
+    let scatter = |found: &Comparison| found.laws[0].fleet[0].scatter.unwrap();
+    assert!(scatter(&by_airframe) < 4.0, "{}", scatter(&by_airframe));
+    let by_slot = of(&sides(Vec::new()));
+    assert!(scatter(&by_slot) > 100.0, "{}", scatter(&by_slot));
 }
 
 /// Each drone flies the next slot.

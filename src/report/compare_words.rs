@@ -294,3 +294,81 @@ pub(super) fn equal_sentences(comparison: &Comparison) -> Vec<String> {
     }
     sentences
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(changes: &[(Quantity, f64, f64, f64)]) -> LawComparison {
+        let nothing = Estimate::new(1540.0, 2.0);
+        let one = |(quantity, value, se, p): &(Quantity, f64, f64, f64)| Change {
+            quantity: *quantity,
+            reference: nothing,
+            other: nothing,
+            beyond_fleet: Some(Estimate::new(*value, *se)),
+            t: Some(value / se),
+            dof: None,
+            p_value: Some(*p),
+            p_holm: Some(*p),
+        };
+        let is_changed = changes.iter().any(|(_, _, _, p)| *p < LEVEL);
+        let fleet = |quantity, unit: &str| FleetChange {
+            quantity,
+            unit: unit.to_owned(),
+            speed_mps: None,
+            reference: nothing,
+            other: nothing,
+            change: Estimate::new(-4.0, 10.0),
+            z: Some(-0.4),
+            p_value: Some(0.69),
+            scatter: Some(1.3),
+        };
+        LawComparison {
+            pair: Pair { reference: "a/calibration".to_owned(), other: "b/calibration".to_owned() },
+            law: "line that may bend".to_owned(),
+            effort_unit: "us".to_owned(),
+            identity: Identity::Airframe,
+            drones_in_both: 25,
+            only_reference: Vec::new(),
+            only_other: Vec::new(),
+            basis: Basis::Stated,
+            fleet: vec![fleet(Quantity::Hover, "us"), fleet(Quantity::Response, "us/(m/s)")],
+            drones: vec![DroneChange {
+                id: "107".to_owned(),
+                slot: Some(7),
+                other_slot: Some(9),
+                name: "Drone 7".to_owned(),
+                changes: changes.iter().map(one).collect(),
+                is_changed,
+            }],
+            curve: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_drone_that_changed_is_told_with_its_number_and_what_to_look_at() {
+        let heavy = law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 0.1, 0.3, 1.0)]);
+        assert_eq!(
+            drone_sentences(&heavy),
+            ["Drone 107, slot 7 before and 9 now needs 14.2 ± 3.1 µs more in hover than the fleet's change explains (p = \
+              0.0004 among all drones): a weak motor, a propeller, or weight."]
+        );
+        let weak = law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 1.1, 0.3, 0.2)]);
+        assert!(drone_sentences(&weak)[0].contains("its response rose, too"));
+        let none = law(&[(Quantity::Hover, 4.2, 3.1, 0.7)]);
+        assert!(drone_sentences(&none)[0].starts_with("No drone changed"), "{:?}", drone_sentences(&none));
+    }
+
+    #[test]
+    fn the_fleet_is_told_with_the_errors_that_all_share() {
+        let sentence = fleet_sentence(&law(&[(Quantity::Hover, 4.2, 3.1, 0.7)])).unwrap();
+        assert!(sentence.starts_with("The fleet as a whole (25 drones in both) needs −4 ± 10 µs in hover (p = 0.69), no more"), "{sentence}");
+    }
+
+    #[test]
+    fn probabilities_are_never_zero() {
+        assert_eq!(probability(Some(1e-30)), "p < 0.0001");
+        assert_eq!(probability(Some(0.25)), "p = 0.25");
+        assert_eq!(probability(None), "p not known");
+    }
+}

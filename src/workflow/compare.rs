@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::ending::Ending;
 use super::error::WorkflowError;
-use super::find::stem;
+use super::find::{labels, stem};
 use super::host::Host;
 use super::made_by;
 use crate::analysis::result::{ANALYSIS_SCHEMA, Analysis, FlightAnalysis};
@@ -34,7 +34,7 @@ const MOST_ANALYSIS_BYTES: u64 = 4 << 30;
 pub struct Request {
     /// Campaign folders, folders with an analysis.json, or such files; the first is the reference.
     pub paths: Vec<PathBuf>,
-    /// Which law is compared.
+    /// Choice of the law that is compared.
     pub law: LawChoice,
     /// Folder of numbers and report; `None`: nothing is written.
     pub output: Option<PathBuf>,
@@ -61,7 +61,7 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
     if let Some(output) = &request.output {
         refuse_output(output)?;
     }
-    let ids = ids(&request.paths);
+    let ids = labels(&request.paths);
     let (mut sides, mut inputs) = (Vec::new(), Vec::new());
     for (path, id) in request.paths.iter().zip(ids) {
         host.check_stop()?;
@@ -136,38 +136,6 @@ fn refuse_twice(paths: &[PathBuf]) -> Result<(), WorkflowError> {
 /// Path of the analysis behind a path.
 fn analysis_of(path: &Path) -> PathBuf {
     if path.is_dir() { path.join("analysis.json") } else { path.to_owned() }
-}
-
-/// Labels of the sides: names of their folders, with the folder above where two have the same, and numbered where that
-/// does not help.
-fn ids(paths: &[PathBuf]) -> Vec<String> {
-    let folder = |path: &PathBuf| {
-        let whole = path.canonicalize().unwrap_or_else(|_| path.clone());
-        match whole.parent() {
-            Some(parent) if whole.file_name().is_some_and(|name| name == "analysis.json") => {
-                parent.to_owned()
-            }
-            _ => whole,
-        }
-    };
-    let folders: Vec<PathBuf> = paths.iter().map(folder).collect();
-    let mut ids: Vec<String> = folders.iter().map(|path| stem(path)).collect();
-    let twin =
-        |ids: &[String], index: usize| ids.iter().filter(|one| **one == ids[index]).count() > 1;
-    let plain = ids.clone();
-    for (index, path) in folders.iter().enumerate() {
-        if let Some(above) = path.parent().filter(|_| twin(&plain, index)) {
-            ids[index] = format!("{}/{}", stem(above), plain[index]);
-        }
-    }
-    let named = ids.clone();
-    for index in 0..ids.len() {
-        let before = named.iter().take(index).filter(|one| **one == named[index]).count();
-        if before > 0 {
-            ids[index] = format!("{}-{}", named[index], before + 1);
-        }
-    }
-    ids
 }
 
 /// The format's name alone.
@@ -269,14 +237,6 @@ fn facts_of(flight: &FlightAnalysis, folder: &FlightFolder) -> FlightFacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn labels_of_folders_with_one_name_have_the_folder_above() {
-        let paths = ["may/monday", "june/monday", "june/tuesday"].map(PathBuf::from);
-        assert_eq!(ids(&paths), ["may/monday", "june/monday", "tuesday"]);
-        let twice = ["x/may/monday", "y/may/monday"].map(PathBuf::from);
-        assert_eq!(ids(&twice), ["may/monday", "may/monday-2"]);
-    }
 
     #[test]
     fn other_formats_are_refused_by_their_name() {

@@ -26,6 +26,7 @@ fn json_schemas_are_current() {
         (Format::Campaign, "campaign"),
         (Format::Flight, "flight"),
         (Format::Analysis, "analysis"),
+        (Format::Compare, "compare"),
         (Format::Study, "study"),
         (Format::Cell, "cell"),
         (Format::Sensitivity, "sensitivity"),
