@@ -3,7 +3,7 @@
 //! The data's way through the house is one-directional, and so are the dependencies:
 //!
 //! ```text
-//! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap | study -> report
+//! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap | study | compare -> report
 //! ```
 //!
 //! Another program can run a campaign through [`workflow`]. Logs, shows, links and the simulator are
@@ -28,6 +28,7 @@
 //! * [`study`]: the same ladder flown in many airs, as in the paper's simulations.
 //! * [`gap`]: which physics a simulation lacks, by measured logs.
 //! * [`blind`]: flights with hidden physics that test it.
+//! * [`compare`]: campaigns side by side, with tests of what differs.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`archive`]: many campaigns as one Parquet dataset.
 //! * [`live`]: a flight as it happens, or as it was, in a browser.
@@ -47,6 +48,7 @@ pub mod base;
 pub mod blind;
 pub mod campaign;
 pub mod cli;
+pub mod compare;
 pub mod fleet;
 pub mod flight;
 pub mod gap;

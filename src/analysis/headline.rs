@@ -3,6 +3,8 @@
 //! It is chosen as the map's law is ([`super::aware`]): by the evidence of all drones' windows for a line that may
 //! bend and for the signed quadratic. The paper's two laws stay in the tables beside it.
 
+use std::array;
+
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,6 +48,9 @@ pub struct BentLine {
     pub drag: Estimate,
     /// Lowest and highest vertical speed of the windows, m/s.
     pub speeds_mps: [f64; 2],
+    /// Covariance of u0, A', B and C, in the products of their units; absent: of an older version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[[f64; 4]; 4]>,
 }
 
 impl BentLine {
@@ -59,6 +64,9 @@ impl BentLine {
             bend: estimate(2),
             drag: estimate(3),
             speeds_mps,
+            covariance: Some(array::from_fn(|row| {
+                array::from_fn(|column| covariance[(row, column)])
+            })),
         }
     }
 
@@ -108,6 +116,7 @@ mod tests {
             bend: Estimate::new(bend, 0.4),
             drag: Estimate::new(0.2, 0.4),
             speeds_mps: [-3.5, 3.5],
+            covariance: None,
         };
         assert!(!of(0.7).is_bent() && of(-0.9).is_bent());
         let bent = of(1.0);

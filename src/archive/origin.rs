@@ -38,7 +38,11 @@ impl Origin {
     pub fn of(flight: &slim::Flight, all: &[FlightSources]) -> Self {
         let sources = match all {
             [one] => Some(one),
-            several => several.iter().find(|sources| sources.plan.name == flight.name),
+            // A plan's second flight has the name of its folder.
+            several => several
+                .iter()
+                .find(|sources| sources.plan.name == flight.name)
+                .or_else(|| several.iter().find(|sources| sources.folder == flight.name)),
         };
         let by_logs = start_by_logs(flight);
         let starts = sources.map(|sources| sources.starts.as_slice()).unwrap_or_default();

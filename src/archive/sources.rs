@@ -15,6 +15,7 @@ use crate::analysis::result::ANALYSIS_SCHEMA;
 use crate::base::digest::{hexadecimal, sha256};
 use crate::base::file::{FileError, open_regular, read_whole};
 use crate::base::parse;
+use crate::base::plain::plain;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::start::{START_FILE, StartRecord, earlier_folders};
 use crate::campaign::{self, CampaignError, FlightFolder, FlightRecord, is_campaign, parse_plan};
@@ -57,6 +58,8 @@ pub struct Sources {
 /// Plan and records of a flight.
 #[derive(Debug)]
 pub struct FlightSources {
+    /// Name of the flight's folder.
+    pub folder: String,
     /// Plan of the flight.
     pub plan: Plan,
     /// SHA-256 of the plan.
@@ -153,7 +156,9 @@ impl FlightSources {
             starts.extend(hashed.json::<StartRecord>("start", &path)?);
         }
         let record = folder.logs_of(LogOrigin::Simulated).record();
+        let name = folder.0.file_name().unwrap_or_default();
         Ok(Some(Self {
+            folder: plain(&name.to_string_lossy()).into_owned(),
             plan,
             plan_sha256: sha256(&bytes),
             simulated: hashed.json("simulated", &record)?,

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::blind::BlindError;
 use crate::campaign::CampaignError;
+use crate::compare::CompareError;
 use crate::gap::GapError;
 use crate::log::LogError;
 use crate::mission::resolve::MissionError;
@@ -79,6 +80,10 @@ pub fn exit_of(error: &CommandError) -> Exit {
             GapError::Simulation(_) => Exit::Failed,
             _ => Exit::Nothing,
         },
+        E::Compare(CompareError::NothingInCommon { .. } | CompareError::Nothing { .. }) => {
+            Exit::Nothing
+        }
+        E::Compare(_) => Exit::Usage,
         E::Output(error) if is_end_of_pipe(error) => Exit::Done,
         E::Log(LogError::Open { .. })
         | E::File(_)

@@ -6,6 +6,7 @@ mod archive;
 mod blind;
 mod check;
 mod cluster;
+mod compare;
 mod context;
 mod effects;
 mod effects_plot;
@@ -68,6 +69,7 @@ use crate::workflow::clock::SharedClock;
   updraft sweep                                   the paper's simulation study, with its figure 2
   updraft analyze my-campaign                     or a folder of logs, or one log
   updraft gap my-campaign                         what physics the model lacks
+  updraft compare monday tuesday                  what changed: drones, fleet, air
   updraft archive seasons/                        all campaigns below as one Parquet dataset
   updraft inspect my-campaign/show.skyc
 
@@ -152,6 +154,8 @@ enum Command {
     Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
+    /// Put campaigns side by side: laws, drones that changed, maps, scales of the air
+    Compare(compare::CompareArgs),
     /// Gather campaigns into one Parquet dataset, for queries over a season
     Archive(archive::ArchiveArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate the results with the truth
@@ -290,6 +294,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Logs(args) => logs::run(context, &args),
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
+        Command::Compare(args) => compare::run(context, &args),
         Command::Archive(args) => archive::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),
         Command::Gap(args) => gap::run(context, &args),

@@ -36,6 +36,7 @@ use crate::blind::told::HiddenRun;
 use crate::campaign::items::ItemsRecord;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
+use crate::compare::result::Comparison;
 use crate::fleet::changes::Changes;
 use crate::fleet::logs::manifest::Manifest;
 use crate::fleet::slots::FleetTable;
@@ -96,6 +97,8 @@ pub enum Format {
     Flight,
     /// analysis.json
     Analysis,
+    /// compare.json, and what `updraft compare --json` prints
+    Compare,
     /// study.json
     Study,
     /// a finished flight of a study
@@ -219,6 +222,7 @@ impl Format {
             Self::Flight => schema_for!(FlightRecord),
             Self::Start => schema_for!(StartRecord),
             Self::Analysis => schema_for!(Analysis),
+            Self::Compare => schema_for!(Comparison),
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),
             Self::Sensitivity => schema_for!(SensitivityResult),

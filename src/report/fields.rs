@@ -6,9 +6,7 @@
 use std::fmt::Write as _;
 use std::io;
 
-use crate::analysis::result::{
-    Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, QualityFlag, UpdraftMap,
-};
+use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, QualityFlag, UpdraftMap};
 use crate::numeric::median;
 
 use super::text::clean;
@@ -39,7 +37,7 @@ const FILLED: &str = "filled";
 /// A row of the measured fields: one drone in one second.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldRow {
-    /// Name of the flight.
+    /// Name of the flight, which no other flight of the analysis has.
     pub flight: String,
     /// Show time of the second, s.
     pub time_s: f64,
@@ -73,33 +71,40 @@ pub struct FieldRow {
 
 /// Rows of all flights, flight by flight and drone by drone; drones without a log come last.
 pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
-    analysis.flights.iter().flat_map(|flight| {
-        let map = flight.map.iter();
-        map.flat_map(move |map| measured(flight, map).chain(filled(flight, map)))
+    analysis.flights.iter().zip(ids(analysis)).flat_map(|(flight, id)| {
+        let maps = flight.map.iter();
+        maps.flat_map(move |map| measured(id.clone(), map).chain(filled(id.clone(), map)))
     })
 }
 
+/// Names of the flights as tables have them: numbered where an earlier flight has the same, so that the rows of two
+/// flights are never taken for those of one.
+pub fn ids(analysis: &Analysis) -> Vec<String> {
+    let mut ids: Vec<String> = Vec::new();
+    for flight in &analysis.flights {
+        let name = clean(&flight.name);
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|id| !ids.contains(id));
+        ids.push(free.unwrap_or_default());
+    }
+    ids
+}
+
 /// Rows of the drones with a log.
-fn measured<'a>(
-    flight: &'a FlightAnalysis,
-    map: &'a UpdraftMap,
-) -> impl Iterator<Item = FieldRow> + 'a {
+fn measured(flight: String, map: &UpdraftMap) -> impl Iterator<Item = FieldRow> + '_ {
     map.drones.iter().flat_map(move |drone| {
-        let times = map.time_s.iter().enumerate();
-        times.map(move |(index, &time_s)| row(&flight.name, drone, index, time_s))
+        let (flight, times) = (flight.clone(), map.time_s.iter().enumerate());
+        times.map(move |(index, &time_s)| row(&flight, drone, index, time_s))
     })
 }
 
 /// Rows of the drones without one.
-fn filled<'a>(
-    flight: &'a FlightAnalysis,
-    map: &'a UpdraftMap,
-) -> impl Iterator<Item = FieldRow> + 'a {
+fn filled(flight: String, map: &UpdraftMap) -> impl Iterator<Item = FieldRow> + '_ {
     let height_m = median(map.drones.iter().map(|drone| drone.height_m).collect());
     let drones = map.posterior.iter().flat_map(|posterior| &posterior.filled);
     drones.flat_map(move |drone| {
-        let times = map.time_s.iter().enumerate();
-        times.map(move |(index, &time_s)| filled_row(&flight.name, drone, height_m, index, time_s))
+        let (flight, times) = (flight.clone(), map.time_s.iter().enumerate());
+        times.map(move |(index, &time_s)| filled_row(&flight, drone, height_m, index, time_s))
     })
 }
 
@@ -133,7 +138,7 @@ fn filled_row(
 ) -> FieldRow {
     let value = |of: &[Option<f64>]| finite(of.get(index).copied().flatten());
     FieldRow {
-        flight: clean(flight),
+        flight: flight.to_owned(),
         time_s,
         slot: Some(drone.slot),
         drone: format!("slot {}", drone.slot),
@@ -161,7 +166,7 @@ fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRo
         [0, 1, 2].map(|axis| at.map(|p| p[axis]))
     };
     FieldRow {
-        flight: clean(flight),
+        flight: flight.to_owned(),
         time_s,
         slot: drone.slot,
         drone: clean(&drone.name),
@@ -252,6 +257,22 @@ mod tests {
         assert_eq!(flags(&quality, 9.0), "");
         assert_eq!(flags(&quality, 15.0), "drift;low_battery");
         assert_eq!(flags(&quality, 30.0), "drift");
+    }
+
+    #[test]
+    fn flights_of_one_name_are_told_apart() {
+        let flight = |name: &str| {
+            serde_json::json!({
+                "name": name, "purpose": "measurement", "planned": true, "true_updraft_mps": null, "drones": [],
+                "missing": [], "flock": null, "table": [], "map": null
+            })
+        };
+        let flights = ["hover", "hover-2", "hover"].map(flight);
+        let analysis: Analysis = serde_json::from_value(serde_json::json!({
+            "schema": "", "made_by": "", "title": "", "flights": flights, "warnings": []
+        }))
+        .unwrap();
+        assert_eq!(ids(&analysis), ["hover", "hover-2", "hover-3"]);
     }
 
     #[test]

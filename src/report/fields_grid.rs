@@ -7,8 +7,7 @@ use std::io;
 
 use crate::analysis::result::{Analysis, PosteriorGrid};
 
-use super::fields::{number, quoted};
-use super::text::clean;
+use super::fields::{ids, number, quoted};
 
 /// Names of the columns, in the order of the file.
 pub const COLUMNS: [&str; 7] = ["flight", "time_s", "x_m", "y_m", "z_m", "w_mps", "sd_mps"];
@@ -34,23 +33,25 @@ pub struct GridRow {
 
 /// All known cells: flight by flight, time by time, along y, then along x.
 pub fn rows(analysis: &Analysis) -> impl Iterator<Item = GridRow> + '_ {
-    analysis.flights.iter().flat_map(|flight| {
+    analysis.flights.iter().zip(ids(analysis)).flat_map(|(flight, id)| {
         let posterior = flight.map.as_ref().and_then(|map| map.posterior.as_ref());
         let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
-        grid.into_iter().flat_map(move |grid| cells(&flight.name, grid))
+        grid.into_iter().flat_map(move |grid| cells(id.clone(), grid))
     })
 }
 
-fn cells<'a>(flight: &'a str, grid: &'a PosteriorGrid) -> impl Iterator<Item = GridRow> + 'a {
+fn cells(flight: String, grid: &PosteriorGrid) -> impl Iterator<Item = GridRow> + '_ {
     grid.time_s.iter().enumerate().flat_map(move |(time, &time_s)| {
+        let flight = flight.clone();
         grid.y_m.iter().enumerate().flat_map(move |(row, &y_m)| {
+            let flight = flight.clone();
             grid.x_m.iter().enumerate().filter_map(move |(column, &x_m)| {
                 let value = |of: &[Vec<Vec<Option<f64>>>]| {
                     let value = of.get(time)?.get(row)?.get(column).copied().flatten();
                     value.filter(|value| value.is_finite())
                 };
                 Some(GridRow {
-                    flight: clean(flight),
+                    flight: flight.clone(),
                     time_s,
                     x_m,
                     y_m,

@@ -13,6 +13,9 @@ mod axis;
 mod chart;
 mod colour;
 mod compare;
+mod compare_page;
+mod compare_terminal;
+mod compare_words;
 mod drone_table;
 mod errors;
 pub mod fields;
@@ -65,6 +68,8 @@ use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
 use crate::study::result::StudyResult;
 
+pub use compare_page::render_comparison;
+pub use compare_terminal::comparison_summary;
 pub use gap_page::render_gap;
 pub use gap_terminal::gap_summary;
 pub use sensitivity_page::render_sensitivity;

@@ -11,6 +11,7 @@ use crate::base::file::FileError;
 use crate::blind::BlindError;
 use crate::campaign::CampaignError;
 use crate::campaign::write::WriteError;
+use crate::compare::CompareError;
 use crate::gap::GapError;
 use crate::link::error::NetError;
 use crate::log::LogError;
@@ -72,6 +73,9 @@ pub enum WorkflowError {
     /// Measurement and simulation cannot be compared.
     #[error(transparent)]
     Gap(#[from] GapError),
+    /// Campaigns cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     /// The request contradicts itself, or a file is of the wrong kind; a sentence for people.
     #[error("{0}")]
     Usage(String),

@@ -37,6 +37,7 @@ pub mod blind;
 pub mod check;
 pub mod clock;
 pub mod cluster;
+pub mod compare;
 pub mod ending;
 pub mod error;
 pub mod find;

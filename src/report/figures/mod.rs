@@ -2,6 +2,7 @@
 
 pub(super) mod air;
 pub(super) mod averaging;
+pub(super) mod compare;
 pub(super) mod correlation;
 pub(super) mod drone;
 pub(super) mod evolution;

@@ -1,5 +1,6 @@
 //! Analysis of many campaigns, each by itself into its own folder; those that are done are not done again.
 
+use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -105,7 +106,7 @@ pub fn ending_of_shard(all: &[EachDone]) -> Ending {
 ///
 /// # Errors
 ///
-/// If the work is stopped, or, where missing analyses are only to be named, one is missing.
+/// If two would be written into one folder, the work is stopped, or, where missing analyses are only to be named, one is missing.
 pub fn each(
     host: &dyn Host,
     requests: &[Request],
@@ -113,6 +114,7 @@ pub fn each(
     hold: Option<&Path>,
     share: Share,
 ) -> Result<Vec<EachDone>, WorkflowError> {
+    refuse_one_folder(requests)?;
     let taken: Vec<&Request> = requests
         .iter()
         .enumerate()
@@ -152,6 +154,25 @@ pub fn each(
     }
     let (count, of, missing) = (missing.len(), taken.len(), missing.join(", "));
     Err(WorkflowError::Missing { what: "analyses", count, of, missing })
+}
+
+/// Refuses two requests whose results would go into one folder, the second over the first.
+fn refuse_one_folder(requests: &[Request]) -> Result<(), WorkflowError> {
+    let mut seen: BTreeMap<PathBuf, &Request> = BTreeMap::new();
+    for request in requests {
+        let folder = request.output()?;
+        let shown = |of: &Request| of.paths.first().map(|path| path.shown().to_string());
+        let before = seen.insert(folder.clone(), request);
+        if let Some(before) = before.filter(|before| before.paths != request.paths) {
+            let [one, other] = [before, request].map(|of| shown(of).unwrap_or_default());
+            return Err(WorkflowError::Usage(format!(
+                "the results of {one} and {other} would both go into {}: give each once, and folders of logs with \
+                 one name in commands of their own, with --output",
+                folder.shown()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Analyses one campaign; the record comes last.

@@ -11,7 +11,9 @@ use crate::flight::identity::{SAME_START_S, later_s};
 use crate::mission::Plan;
 use crate::vehicle::library;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::find::{Found, LevelWish, Work, find, find_tables, level_tables, stem, twice};
+use crate::workflow::find::{
+    Found, LevelWish, Work, find, find_tables, labels, level_tables, numbered, stem, twice,
+};
 use crate::workflow::shows::load::{has_extension, load_shows};
 
 /// Request for an analysis: its input.
@@ -63,11 +65,13 @@ pub fn gather(request: &Request) -> Result<(Work, Option<Indicator>), WorkflowEr
     let plan = request.plan.as_deref().map(load_plan).transpose()?;
     let mut work = Work::new(Path::new("."));
     work.origin = request.origin;
-    for path in &request.paths {
+    let mut behind = Vec::new();
+    for (index, path) in request.paths.iter().enumerate() {
         find(path, plan.as_ref(), &mut work)?;
+        behind.resize(work.flights.len(), index);
     }
     twice::refuse(&request.paths, &work)?;
-    name_apart(&mut work.flights, &request.paths);
+    name_apart(&mut work.flights, &request.paths, &behind);
     let mut indicator = None;
     if let Some(mapping) = &request.tables {
         let held = find_tables(mapping, &mut work)?;
@@ -136,21 +140,88 @@ pub fn load_plan(path: &Path) -> Result<Plan, WorkflowError> {
     Ok(loaded.remove(0).plan)
 }
 
-/// Flights of several campaigns may have the same name: the folder's name tells them apart.
-fn name_apart(flights: &mut [Found], paths: &[PathBuf]) {
-    if paths.len() < 2 || flights.len() != paths.len() {
+/// Flights of several campaigns may have the same name: `monday/hover`, or where each path is one flight, its folder's
+/// name, tells them apart. `behind`: the path of each flight.
+fn name_apart(flights: &mut [Found], paths: &[PathBuf], behind: &[usize]) {
+    if paths.len() < 2 {
         return;
     }
-    let mut names: Vec<String> = paths.iter().map(|path| stem(path)).collect();
-    let mut distinct = names.clone();
-    distinct.sort();
-    distinct.dedup();
-    // `calibration/logs` and `hover/logs`: the flight's folder has the name.
-    if distinct.len() < names.len() {
-        let above = |path: &PathBuf| path.parent().map_or_else(|| stem(path), stem);
-        names = paths.iter().map(above).collect();
-    }
+    let distinct = |names: &[String]| {
+        let mut sorted: Vec<&String> = names.iter().collect();
+        sorted.sort();
+        sorted.dedup();
+        sorted.len() == names.len()
+    };
+    let names = if flights.len() == paths.len() {
+        let plain: Vec<String> = paths.iter().map(|path| stem(path)).collect();
+        if distinct(&plain) {
+            plain
+        } else {
+            // `calibration/logs` and `hover/logs`: the flight's folder has the name.
+            let above = |path: &PathBuf| path.parent().map_or_else(|| stem(path), stem);
+            paths.iter().map(above).collect()
+        }
+    } else {
+        let plain: Vec<String> = flights.iter().map(|flight| flight.name.clone()).collect();
+        if distinct(&plain) {
+            return;
+        }
+        let labels = labels(paths);
+        let whole = |(name, at): (String, &usize)| match labels.get(*at) {
+            Some(label) => format!("{label}/{name}"),
+            None => name,
+        };
+        plain.into_iter().zip(behind).map(whole).collect()
+    };
+    let names = if distinct(&names) { names } else { of_whole_paths(names, paths, behind) };
     for (flight, name) in flights.iter_mut().zip(names) {
         flight.name = name;
+    }
+}
+
+/// Names that are still alike, with the labels of their paths; numbered where these are alike, too.
+fn of_whole_paths(names: Vec<String>, paths: &[PathBuf], behind: &[usize]) -> Vec<String> {
+    let labels = labels(paths);
+    let all = names.clone();
+    let told = names.into_iter().zip(behind).map(|(name, at)| {
+        let is_alone = all.iter().filter(|one| **one == name).count() == 1;
+        labels.get(*at).filter(|_| !is_alone).cloned().unwrap_or(name)
+    });
+    numbered(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(flights: &[(&str, usize)], paths: &[&str]) -> Vec<String> {
+        let mut found: Vec<Found> = flights
+            .iter()
+            .map(|(name, _)| Found { name: (*name).to_owned(), ..Found::default() })
+            .collect();
+        let behind: Vec<usize> = flights.iter().map(|(_, at)| *at).collect();
+        let paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
+        name_apart(&mut found, &paths, &behind);
+        found.into_iter().map(|flight| flight.name).collect()
+    }
+
+    #[test]
+    fn flights_of_several_campaigns_have_names_of_their_own() {
+        let both = [("calibration", 0), ("hover", 0), ("calibration", 1), ("hover", 1)];
+        let expected = ["mon/calibration", "mon/hover", "tue/calibration", "tue/hover"];
+        assert_eq!(named(&both, &["may/mon", "may/tue"]), expected);
+        let expected =
+            ["may/mon/calibration", "may/mon/hover", "june/mon/calibration", "june/mon/hover"];
+        assert_eq!(named(&both, &["may/mon", "june/mon"]), expected);
+        let apart = [("ladder", 0), ("hover", 1), ("hover at noon", 1)];
+        assert_eq!(named(&apart, &["a", "b"]), ["ladder", "hover", "hover at noon"]);
+    }
+
+    #[test]
+    fn folders_of_logs_have_the_names_of_their_flights() {
+        let logs = [("logs", 0), ("logs", 1)];
+        assert_eq!(named(&logs, &["a/calibration/logs", "a/hover/logs"]), ["calibration", "hover"]);
+        let twice = named(&logs, &["a/hover/logs", "b/hover/logs"]);
+        assert_eq!(twice, ["hover/logs", "hover/logs-2"]);
     }
 }

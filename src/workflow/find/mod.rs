@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use self::files::logs_in;
-pub(crate) use self::files::stem;
+pub(crate) use self::files::{labels, numbered, stem};
 use self::flight::found_flight;
 use self::physics::density;
 pub(crate) use self::physics::{is_of_simulator, sag};
@@ -136,7 +136,7 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
         let before = work.flights.len();
         for folder in folders {
             let flight = match found_flight(path, &folder, origin, &work.hashes) {
-                Ok(flight) => flight,
+                Ok(flight) => told_apart(flight, &folder, &work.flights[before..]),
                 // The campaign's other flights can be analysed without this one.
                 Err(error) if several => {
                     work.absent.push(format!(
@@ -189,6 +189,18 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
         ..Found::default()
     });
     Ok(())
+}
+
+/// The flight, with its folder's name where an earlier one of its campaign has the plan's.
+fn told_apart(flight: Found, folder: &FlightFolder, earlier: &[Found]) -> Found {
+    let is_taken = |name: &str| earlier.iter().any(|one| one.name == name);
+    if !is_taken(&flight.name) {
+        return flight;
+    }
+    let of_folder = stem(&folder.0);
+    let numbered = (2..).map(|number| format!("{}-{number}", flight.name));
+    let name = std::iter::once(of_folder).chain(numbered).find(|name| !is_taken(name));
+    Found { name: name.unwrap_or_default(), ..flight }
 }
 
 /// Adds the flights of a mapping file to the work; returns the indicator of rotor effort that they

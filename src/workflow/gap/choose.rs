@@ -11,7 +11,7 @@ use crate::mission::plan::Purpose;
 use crate::vehicle::{Vehicle, library};
 use crate::workflow::analyze::load_plan;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::find::{Found, Work, find, find_tables};
+use crate::workflow::find::{Found, Work, find, find_tables, stem};
 use crate::workflow::host::Host;
 
 /// Vehicle of logs that nobody planned here: the firmware's own simulator.
@@ -154,9 +154,12 @@ pub(super) fn model_of(request: &Request, found: &Found) -> Result<Vehicle, Work
     }
     if let Some(campaign) = &request.campaign {
         let flights = campaign::flights(campaign)?;
-        let of =
+        let by_plan =
             |folder: &&FlightFolder| folder.read_plan().is_ok_and(|plan| plan.name == found.name);
-        if let Some(folder) = flights.iter().find(of) {
+        // A plan's second flight has the name of its folder.
+        let by_folder = |folder: &&FlightFolder| stem(&folder.0) == found.name;
+        let folder = flights.iter().find(by_plan).or_else(|| flights.iter().find(by_folder));
+        if let Some(folder) = folder {
             return Ok(library::load(&folder.vehicle().to_string_lossy())?);
         }
     }

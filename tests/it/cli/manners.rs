@@ -27,6 +27,7 @@ fn exit_codes_follow_one_rule() {
         (1, &["physics", "--campaign", "gone"]),
         (1, &["analyze", "gone"]),
         (1, &["analyze", "gone.BIN"]),
+        (1, &["compare", "gone", "gone.json"]),
         (1, &["sweep", "gone.toml"]),
         (1, &["inspect", "gone"]),
         (1, &["inspect", "gone.skyc"]),
@@ -41,6 +42,7 @@ fn exit_codes_follow_one_rule() {
         (2, &["simulate", "notes.txt"]),
         (2, &["physics", "--campaign", "notes.txt"]),
         (2, &["analyze", "notes.txt"]),
+        (2, &["compare", "notes.txt", "notes.toml"]),
         (2, &["sweep", "notes.toml"]),
         (2, &["inspect", "notes.txt"]),
         (2, &["inspect", "notes.skyc"]),
@@ -57,6 +59,7 @@ fn exit_codes_follow_one_rule() {
         (5, &["simulate", "empty"]),
         (5, &["physics", "--campaign", "empty"]),
         (5, &["analyze", "empty"]),
+        (5, &["compare", "empty", "campaign"]),
         (5, &["inspect", "empty"]),
     ];
     let mut wrong = Vec::new();

@@ -12,6 +12,7 @@ mod analyze_messages;
 mod analyze_unplanned;
 mod blind_game;
 mod check;
+mod compare;
 #[cfg(unix)]
 mod drones;
 mod effects;

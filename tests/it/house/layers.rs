@@ -29,8 +29,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("gap", &["base", "numeric", "mission", "flight", "analysis"]),
     ("blind", &["base", "numeric", "mission", "campaign", "flight", "analysis", "gap"]),
     ("study", &["base", "numeric", "mission", "flight", "analysis"]),
+    ("compare", &["base", "numeric", "mission", "flight", "analysis"]),
     ("archive", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis", "gap"]),
-    ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study"]),
+    ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study", "compare"]),
     ("live", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis"]),
     (
         "workflow",
@@ -48,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "gap",
             "blind",
             "study",
+            "compare",
             "report",
             "archive",
         ],

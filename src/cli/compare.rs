@@ -1,0 +1,83 @@
+//! `updraft compare`: campaigns side by side.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use crate::base::plain::Shown as _;
+use crate::compare::LawChoice;
+use crate::report;
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::compare::{Request, run as compare};
+
+/// Width of the terminal summary, columns: at most, and at least.
+const WIDTH: usize = 100;
+const MIN_WIDTH: usize = 60;
+
+/// Arguments of `updraft compare`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft compare monday tuesday                       # campaigns that were analysed
+  updraft compare monday tuesday wednesday -o week     # each against the first, with a report
+  updraft compare old/analysis.json new/analysis.json --law linear
+  updraft compare monday tuesday --json | jq '.laws[].drones[] | select(.is_changed)'
+
+Says whether the fleet as a whole changed (air density, battery, temperature, air during a calibration),
+and which drones changed by more than the fleet: a weak motor, a propeller, weight. Drones are known by
+their system ids where the campaigns have them, else by their slots. The tests of all drones of a pair
+are corrected together (Holm): the probability that any is named wrongly is at most 5 %. Maps are
+compared by their means, and by place where the grids agree, scales of the air by their intervals
+(docs/compare.md).
+
+Exit code 3: done, but something that both have could not be compared, and is named. Exit code 5: the
+campaigns have no flight in common, or nothing can be compared.")]
+pub(super) struct CompareArgs {
+    /// Analysed campaigns, folders with an analysis.json, or such files; the first is the reference
+    #[arg(value_name = "CAMPAIGN", required = true, num_args = 2..)]
+    campaigns: Vec<PathBuf>,
+    /// Folder for compare.json and report/index.html [default: nothing is written]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Which law is compared
+    #[arg(long, value_enum, default_value_t = Law::Preferred)]
+    law: Law,
+}
+
+/// Which law is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Law {
+    /// The one that each flight's windows prefer
+    Preferred,
+    /// The paper's line
+    Linear,
+    /// The paper's signed quadratic
+    SignedQuadratic,
+}
+
+pub(super) fn run(context: &Context, args: &CompareArgs) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start(context);
+    let request = Request {
+        paths: args.campaigns.clone(),
+        law: match args.law {
+            Law::Preferred => LawChoice::Preferred,
+            Law::Linear => LawChoice::Linear,
+            Law::SignedQuadratic => LawChoice::SignedQuadratic,
+        },
+        output: args.output.clone(),
+    };
+    let compared = compare(context, &request)?;
+    if context.json {
+        context.print_json(&compared.comparison)?;
+    } else {
+        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
+        let text = report::comparison_summary(&compared.comparison, width, context.color);
+        context.print(&text)?;
+    }
+    if let Some(page) = &compared.page {
+        context.result(page)?;
+        context.say(&format!("Compared in {watch} -> {}", page.shown()));
+    }
+    Ok(compared.ending.into())
+}

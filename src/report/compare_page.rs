@@ -1,0 +1,228 @@
+//! The HTML page of campaigns side by side.
+
+use minijinja::context;
+use minijinja::value::Value;
+
+use crate::compare::result::{
+    Comparison, DroneChange, LawComparison, MapComparison, Pair, Quantity,
+};
+
+use super::compare_terminal::title;
+use super::compare_words as words;
+use super::figures::compare::{drones, laws, maps, structure};
+use super::fill::{common, fill};
+use super::text::{NONE, clean, count, estimate, slug, unit};
+use super::{Figure, Provenance, Report, ReportError};
+
+const PAGE: &str = include_str!("../../templates/report/compare.html");
+
+/// Renders the page and the figures of a comparison.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_comparison(
+    comparison: &Comparison,
+    provenance: &Provenance,
+) -> Result<Report, ReportError> {
+    let mut figures = Figures::default();
+    let laws: Vec<Value> = comparison
+        .laws
+        .iter()
+        .enumerate()
+        .map(|(index, law)| law_section(law, index, &mut figures))
+        .collect();
+    let maps: Vec<Value> = comparison
+        .maps
+        .iter()
+        .enumerate()
+        .map(|(index, map)| map_section(comparison, map, index, &mut figures))
+        .collect();
+    let campaigns: Vec<Value> = comparison
+        .campaigns
+        .iter()
+        .map(|one| {
+            context! {
+                id => clean(&one.id),
+                path => clean(&one.path),
+                title => clean(&one.title),
+                vehicle => one.vehicle.as_deref().map_or_else(|| NONE.to_owned(), clean),
+                flights => one.flights.iter().map(|id| clean(id)).collect::<Vec<_>>().join(", "),
+            }
+        })
+        .collect();
+    let cleaned = |items: &[String]| items.iter().map(|item| clean(item)).collect::<Vec<_>>();
+    let ids: Vec<String> = comparison.campaigns.iter().map(|one| clean(&one.id)).collect();
+    let values = context! {
+        title => title(&ids),
+        verdict => verdict(comparison),
+        tiles => tiles(comparison),
+        campaigns,
+        laws,
+        maps,
+        equal => words::equal_sentences(comparison),
+        not_compared => cleaned(&comparison.not_compared),
+        notes => cleaned(&comparison.notes),
+        schema => clean(&comparison.schema),
+        ..common(provenance),
+    };
+    let html = fill("compare.html", PAGE, values)?;
+    Ok(Report { html, figures: figures.files })
+}
+
+/// Figures, numbered in the order in which they are shown.
+#[derive(Default)]
+struct Figures {
+    files: Vec<(String, String)>,
+}
+
+impl Figures {
+    fn show(&mut self, figure: Option<Figure>) -> Option<Value> {
+        let figure = figure?;
+        let shown = context! {
+            number => self.files.len() + 1,
+            name => figure.name.clone(),
+            title => figure.title,
+            caption => figure.caption,
+            svg => Value::from_safe_string(figure.svg.clone()),
+        };
+        self.files.push((figure.name, figure.svg));
+        Some(shown)
+    }
+}
+
+fn key(of: &Pair, index: usize) -> String {
+    format!("{}-{}", slug(&of.other), index + 1)
+}
+
+fn verdict(comparison: &Comparison) -> Vec<String> {
+    let laws = comparison
+        .laws
+        .iter()
+        .flat_map(|law| words::drone_sentences(law).into_iter().chain(words::fleet_sentence(law)));
+    let maps =
+        comparison.maps.iter().filter_map(|map| words::map_sentences(map).into_iter().next());
+    laws.chain(maps).take(MOST_TOLD).collect()
+}
+
+/// Sentences above everything else; all are below.
+const MOST_TOLD: usize = 6;
+
+fn tiles(comparison: &Comparison) -> Vec<Value> {
+    let several = comparison.campaigns.len() > 2;
+    let of =
+        |pair: &Pair| if several { format!(", {}", clean(&pair.other)) } else { String::new() };
+    let mut tiles = Vec::new();
+    for law in &comparison.laws {
+        let changed = law.drones.iter().filter(|one| one.is_changed).count();
+        tiles.push(context! {
+            label => format!("drones that changed{}", of(&law.pair)),
+            value => changed.to_string(),
+            note => format!("of {} in both", law.drones_in_both),
+        });
+        let hover = law.fleet.iter().find(|change| change.quantity == Quantity::Hover);
+        if let Some(hover) = hover {
+            tiles.push(context! {
+                label => format!("fleet in hover ({}){}", unit(&hover.unit), of(&law.pair)),
+                value => words::change(hover.change),
+                note => words::probability(hover.p_value),
+            });
+        }
+    }
+    for map in &comparison.maps {
+        tiles.push(context! {
+            label => format!("mean of the air (m/s){}", of(&map.pair)),
+            value => words::change(map.mean.change),
+            note => words::probability(map.mean.p_value),
+        });
+    }
+    tiles
+}
+
+fn law_section(law: &LawComparison, index: usize, figures: &mut Figures) -> Value {
+    let key = key(&law.pair, index);
+    let fleet: Vec<Value> = law
+        .fleet
+        .iter()
+        .map(|one| {
+            context! {
+                name => words::quantity(one),
+                unit => unit(&one.unit),
+                reference => estimate(one.reference),
+                other => estimate(one.other),
+                change => words::change(one.change),
+                p => words::probability_cell(one.p_value),
+            }
+        })
+        .collect();
+    let shown = [figures.show(laws::figure(law, &key)), figures.show(drones::figure(law, &key))];
+    context! {
+        heading => words::pair(&law.pair),
+        law => clean(&law.law),
+        drones_in_both => count(law.drones_in_both, "drone"),
+        sentences => words::drone_sentences(law)
+            .into_iter()
+            .chain(words::fleet_sentence(law))
+            .chain(words::errors_sentence(law))
+            .collect::<Vec<_>>(),
+        fleet,
+        drones => law.drones.iter().map(|one| drone_row(law, one)).collect::<Vec<_>>(),
+        figures => shown.into_iter().flatten().collect::<Vec<_>>(),
+    }
+}
+
+fn drone_row(law: &LawComparison, one: &DroneChange) -> Value {
+    let of = |quantity: Quantity| {
+        let change = one.changes.iter().find(|change| change.quantity == quantity);
+        let beyond = change.and_then(|change| change.beyond_fleet);
+        context! {
+            reference => change.map_or_else(|| NONE.to_owned(), |of| estimate(of.reference)),
+            other => change.map_or_else(|| NONE.to_owned(), |of| estimate(of.other)),
+            beyond => beyond.map_or_else(|| NONE.to_owned(), words::change),
+            p => words::probability_cell(change.and_then(|change| change.p_value)),
+            p_holm => words::probability_cell(change.and_then(|change| change.p_holm)),
+        }
+    };
+    context! {
+        name => words::drone(one, law.identity),
+        is_changed => one.is_changed,
+        hover => of(Quantity::Hover),
+        response => of(Quantity::Response),
+        climb => of(Quantity::Climb),
+        descent => of(Quantity::Descent),
+    }
+}
+
+fn map_section(
+    comparison: &Comparison,
+    map: &MapComparison,
+    index: usize,
+    figures: &mut Figures,
+) -> Value {
+    let key = key(&map.pair, index);
+    let scales: Vec<Value> = map
+        .scales
+        .iter()
+        .map(|row| {
+            context! {
+                name => clean(&row.name),
+                unit => unit(&row.unit),
+                reference => words::scale(row.reference, row.reference_interval),
+                other => words::scale(row.other, row.other_interval),
+                p => words::probability_cell(row.p_value),
+                p_holm => words::probability_cell(row.p_holm),
+                differs => words::differs(row),
+            }
+        })
+        .collect();
+    let correlations = comparison.structures.iter().find(|one| one.pair == map.pair);
+    let shown = [
+        figures.show(maps::figure(map, &key)),
+        figures.show(correlations.and_then(|one| structure::figure(one, &key))),
+    ];
+    context! {
+        heading => words::pair(&map.pair),
+        sentences => words::map_sentences(map),
+        scales,
+        figures => shown.into_iter().flatten().collect::<Vec<_>>(),
+    }
+}
