@@ -100,13 +100,14 @@ fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
             format!("of the means of {} places", air.n)
         };
         let label = format!("rms error {of}");
+        let against = if flight.simulated { "simulated air" } else { "instrument's values" };
         tiles.push(match together.and_then(|_| together_error(map)) {
             Some(error) => (
                 fixed(error, 2),
                 format!("{label}: all drones together"),
-                format!("m/s, against the simulated air; each drone alone: {}", fixed(alone, 2)),
+                format!("m/s, against the {against}; each drone alone: {}", fixed(alone, 2)),
             ),
-            None => (fixed(alone, 2), label, "m/s, against the simulated air".to_owned()),
+            None => (fixed(alone, 2), label, format!("m/s, against the {against}")),
         });
     }
     tiles

@@ -8,7 +8,7 @@ use super::text::clean;
 /// A page or file that belongs to a page, as a relative link.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PageLink {
-    /// What it is, for people.
+    /// Title for people.
     pub title: String,
     /// Relative address, as seen from the page's folder; empty for what only a command shows.
     pub href: String,

@@ -16,6 +16,7 @@ for (const gallery of document.querySelectorAll(".gallery")) {
     else if (select.value === first) drawing.replaceChildren(kept);
     const label = drawing.querySelector("title");
     title.textContent = "Figure " + select.value.replace(/^fig(?=\d)/, "") + ". " + (label ? label.textContent : "") + ".";
+    drawing.setAttribute("aria-label", label ? label.textContent : "");
     link.textContent = select.value + ".svg";
     link.href = "figures/" + link.textContent;
   };

@@ -78,7 +78,11 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
         when(flight).map_or_else(String::new, |when| format!(" and {}", duration(when.length_s())));
     if let Some(mean) = Mean::of(map) {
         let drones = map.drones.iter().filter(|drone| usable(drone.mean.value)).count();
-        let whole = if drones == 1 { "one place".to_owned() } else { format!("{drones} places") };
+        let whole = match (map.is_scan(), drones) {
+            (true, n) => format!("the tracks of {}", count(n, "drone")),
+            (false, 1) => "one place".to_owned(),
+            (false, n) => format!("{n} places"),
+        };
         said.push(if mean.is_told_from_zero() {
             let verb = if mean.value > 0.0 { "rose" } else { "sank" };
             format!(
@@ -93,7 +97,8 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
                 mean.words(),
             )
         });
-        said.extend(truth_sentence(map, mean));
+        said.extend(levelled_sentence(map));
+        said.extend(truth_sentence(flight, map, mean));
     } else {
         said.push(format!("{name}No mean of the vertical air speed can be told."));
     }
@@ -113,8 +118,18 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
     said
 }
 
-/// Against the air of the simulator.
-fn truth_sentence(map: &UpdraftMap, found: Mean) -> Option<String> {
+/// Of a map whose zero is none of a calibration's.
+fn levelled_sentence(map: &UpdraftMap) -> Option<String> {
+    let [from, to] = map.levelled.as_ref()?.zero_s?;
+    Some(format!(
+        "The zero is the flight's own: the mean of the air from {} to {} s of show time is taken for none.",
+        fixed(from, 0),
+        fixed(to, 0)
+    ))
+}
+
+/// Against the air of the simulator, or what an instrument beside the drones read.
+fn truth_sentence(flight: &FlightAnalysis, map: &UpdraftMap, found: Mean) -> Option<String> {
     let truth = mean(map.drones.iter().filter_map(mean_truth))?;
     let inside = found.interval.map(|[low, high]| (low..=high).contains(&truth));
     let decimals = decimal_places(Estimate::new(truth, found.se));
@@ -123,7 +138,12 @@ fn truth_sentence(map: &UpdraftMap, found: Mean) -> Option<String> {
         Some(false) => ", outside that interval",
         None => "",
     };
-    Some(format!("The true mean was {} m/s{where_it_lies}.", signed(truth, decimals)))
+    let truth = signed(truth, decimals);
+    Some(if flight.simulated {
+        format!("The true mean of the simulated air was {truth} m/s{where_it_lies}.")
+    } else {
+        format!("The mean that was measured beside the drones was {truth} m/s{where_it_lies}.")
+    })
 }
 
 /// `The wind was 2.9 ± 1.0 m/s from 270° (west), by the lean of the drones.`

@@ -99,8 +99,7 @@ fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
         (
             1,
             format!(
-                "The errors are too small here: only {} % of the true values of the simulated air lie inside \
-                 their 95 % intervals.",
+                "The errors are too small here: only {} % of the true values lie inside their 95 % intervals.",
                 fixed(100.0 * truth.inside_share, 0)
             ),
         )
