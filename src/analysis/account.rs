@@ -120,6 +120,7 @@ mod tests {
             calibration: Err(calibrate(&[], &FitOptions::default()).unwrap_err()),
             updraft: None,
             hover: HoverSeen::default(),
+            first_fix_deg: None,
             truth: None,
         }
     }

@@ -31,6 +31,7 @@ use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
     LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
 };
+use super::site::FlightSite;
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
 use super::statistics::result::FieldStatistics;
@@ -320,6 +321,8 @@ const LISTED: usize = 20;
 fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> FlightAnalysis {
     let Shared { input, options, .. } = shared;
     let Account { ones, unused, partly_used } = account;
+    let fixes = ones.iter().filter_map(|one| one.first_fix_deg);
+    let site = input.plan.map(FlightSite::of_plan).or_else(|| FlightSite::of_fixes(fixes));
     let climbed: Vec<(usize, usize)> = (ones.iter().filter(|one| one.calibration.is_ok()))
         .map(|one| rungs(&one.drone.windows, &options.fit))
         .collect();
@@ -358,6 +361,8 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         indicator: options.indicator,
         planned: input.plan.is_some(),
         orientation_deg: input.plan.map(|plan| plan.site.orientation_deg),
+        site,
+        simulated: input.simulated,
         true_updraft_mps: input.true_updraft_mps,
         logs: input.logs.len(),
         missing: account::missing(input, &drones, &unused),

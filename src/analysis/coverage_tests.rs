@@ -180,6 +180,8 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
     FlightAnalysis {
         indicator: Indicator::Pulse,
         orientation_deg: None,
+        site: None,
+        simulated: false,
         statistics: None,
         wind_legs: None,
         name: String::new(),

@@ -51,6 +51,8 @@ pub(super) struct One {
     pub(super) updraft: Option<Result<(DroneSeries, LawOf), Cause>>,
     /// Its hover, for the statistics.
     pub(super) hover: HoverSeen,
+    /// Place of its first fix: (latitude, longitude), degrees.
+    pub(super) first_fix_deg: Option<(f64, f64)>,
     /// What something beside the drone measured of the air.
     pub(super) truth: Option<TruthSeries>,
 }
@@ -140,7 +142,8 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
     let hover = HoverSeen::of(flight, &corrected, &of_air);
     let truth = true_air(flight, &of_air);
-    Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, truth })
+    let first_fix_deg = flight.first_fix_deg;
+    Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, first_fix_deg, truth })
 }
 
 /// That none of the windows lies in the time that the log speaks of.

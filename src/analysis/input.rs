@@ -57,6 +57,8 @@ pub struct FlightInput<'a> {
     pub logs: &'a [LogInput],
     /// GPS time of show time 0, for logs without SHOW rows.
     pub start: Option<GpsTime>,
+    /// Whether the simulator wrote the logs.
+    pub simulated: bool,
     /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
     pub true_updraft_mps: Option<f64>,
     /// The true vertical air speed that each slot met, when it was written down.

@@ -49,6 +49,7 @@ pub mod response;
 pub mod result;
 mod running;
 mod shape;
+mod site;
 pub mod slots;
 mod split;
 mod starts;

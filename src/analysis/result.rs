@@ -18,6 +18,7 @@ use super::kind::{LawKind, LawOf};
 pub use super::ladder::{Ladder, PartialLadder};
 pub use super::level::{DroneLevel, HeldOut, HeldOutErrors, LevelledMap};
 use super::offset::OffsetMap;
+pub use super::site::FlightSite;
 use super::statistics::result::FieldStatistics;
 pub use super::stats::SampleStats;
 use super::table::PaperTable;
@@ -66,6 +67,12 @@ pub struct FlightAnalysis {
     /// plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_deg: Option<f64>,
+    /// Place on the globe; absent: neither a plan nor a log says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site: Option<FlightSite>,
+    /// Whether the simulator wrote the logs.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub simulated: bool,
     /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
     pub true_updraft_mps: Option<f64>,
     /// Analysed drones, in slot order.

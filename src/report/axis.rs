@@ -6,6 +6,8 @@ use crate::numeric;
 
 use super::text::{fixed, usable};
 
+/// Heights that stand for the ground, which barometers know no better, m.
+const GROUND_M: f64 = 3.0;
 /// Distances of ticks on a time axis.
 const TIME_STEPS_S: [f64; 12] =
     [1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0];
@@ -29,6 +31,17 @@ impl Axis {
         let min = ((low - pad) / step).floor() * step;
         let max = ((high + pad) / step).ceil() * step;
         Self { label: label.to_owned(), min, max, step }
+    }
+
+    /// An axis of heights above the ground: nothing below it is shown, unless something flew there.
+    pub(super) fn heights(values: impl Iterator<Item = f64>) -> Self {
+        let values: Vec<f64> = values.collect();
+        let lowest = numeric::least(values.iter().copied().filter(|&value| usable(value)));
+        let mut axis = Self::around("height (m)", values.into_iter(), 10.0);
+        if axis.min < 0.0 && lowest.is_some_and(|lowest| lowest > -GROUND_M) {
+            axis.min = 0.0;
+        }
+        axis
     }
 
     /// A time axis in seconds, not starting before the data.
@@ -73,6 +86,20 @@ pub(super) fn nice_step(raw: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
+/// The end of a symmetric scale around a size, whose half is round, too: 1, 2, 4, 6, 8 or 10 times a power
+/// of ten.
+pub(super) fn scale_end(largest: f64) -> f64 {
+    if !(largest.is_finite() && largest > 0.0) {
+        return 1.0;
+    }
+    let power = 10_f64.powf(largest.log10().floor());
+    [1.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|&end| end >= largest * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
+}
+
 fn extent(values: impl Iterator<Item = f64>, span: f64) -> (f64, f64) {
     let Some((low, high)) = numeric::extent(values.filter(|&value| usable(value))) else {
         return (0.0, span);
@@ -91,6 +118,20 @@ mod tests {
         assert_eq!((axis.min, axis.max, axis.step), (1450.0, 1750.0, 50.0));
         assert_eq!(decimals_of(0.25), 2);
         assert_eq!(decimals_of(50.0), 0);
+    }
+
+    #[test]
+    fn heights_begin_at_the_ground() {
+        let of = |values: [f64; 2]| Axis::heights(values.into_iter()).min;
+        assert_eq!(of([-0.4, 93.0]), 0.0);
+        assert_eq!(of([-15.0, 93.0]), -20.0, "a valley");
+        assert_eq!(of([20.0, 93.0]), 0.0);
+    }
+
+    #[test]
+    fn scales_and_their_halves_end_on_round_numbers() {
+        assert_eq!([0.52, 1.21, 0.0301, 4.0, 9.1].map(scale_end), [0.6, 2.0, 0.04, 4.0, 10.0]);
+        assert_eq!(scale_end(f64::NAN), 1.0);
     }
 
     #[test]

@@ -12,10 +12,13 @@ use kuva::render::theme::Theme;
 
 use super::axis::Axis;
 use super::colour::{INK, RULE};
+use super::legend::{self, Corner, Inked};
 use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
 
+/// Most steps of its y axis that a panel gains for its legend.
+const MOST_ROOM: usize = 5;
 /// Pixels right of a panel.
 const RIGHT_MARGIN: f64 = 16.0;
 /// Pixels right of a panel with a colour bar.
@@ -62,6 +65,7 @@ pub(super) struct Panel {
     legend: Vec<LegendEntry>,
     legend_position: LegendPosition,
     legend_box: bool,
+    inked: Inked,
     right_margin: f64,
 }
 
@@ -80,11 +84,12 @@ impl Panel {
             legend: Vec::new(),
             legend_position: LegendPosition::InsideTopLeft,
             legend_box: true,
+            inked: Inked::default(),
             right_margin: RIGHT_MARGIN,
         }
     }
 
-    /// Where the legend goes.
+    /// Where the legend goes, if nothing is drawn there; else it goes to another corner.
     pub(super) fn legend_at(&mut self, position: LegendPosition) {
         self.legend_position = position;
     }
@@ -117,6 +122,7 @@ impl Panel {
 
     /// A line, broken where a point cannot be drawn.
     pub(super) fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dash: &str) {
+        self.inked.line(points);
         self.plots.extend(lines(points, colour, width, dash));
     }
 
@@ -124,6 +130,7 @@ impl Panel {
     pub(super) fn band(&mut self, points: &[(f64, f64, f64)], colour: &str) {
         for run in points.split(|&(x, low, high)| !(usable(x) && usable(low) && usable(high))) {
             if run.len() > 1 {
+                self.inked.band(run);
                 let band = BandPlot::new(
                     run.iter().map(|point| point.0),
                     run.iter().map(|point| point.1),
@@ -147,6 +154,12 @@ impl Panel {
             .with_marker(shape);
         scatter.marker_opacity = Some(0.85);
         self.plots.push(Plot::Scatter(scatter));
+        for Mark { x, y, x_error, y_error } in &marks {
+            self.inked.point(*x, *y);
+            for (x_half, y_half) in [(*x_error, 0.0), (0.0, *y_error)] {
+                self.inked.line(&[(x - x_half, y - y_half), (x + x_half, y + y_half)]);
+            }
+        }
         self.bars.push((marks, colour.to_owned()));
     }
 
@@ -166,7 +179,8 @@ impl Panel {
     }
 
     /// Draws the panel into a scene of this size, pixels.
-    pub(super) fn draw(self, width: f64, height: f64) -> Scene {
+    pub(super) fn draw(mut self, width: f64, height: f64) -> Scene {
+        self.place_legend(width, height);
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
             .with_width(width)
             .with_height(height)
@@ -210,6 +224,38 @@ impl Panel {
             color: None,
         });
         scene
+    }
+}
+
+impl Panel {
+    /// Moves a legend off the data: to a free corner, else with more room at the top.
+    fn place_legend(&mut self, width: f64, height: f64) {
+        let Some(mut corner) = Corner::of(self.legend_position).filter(|_| !self.legend.is_empty())
+        else {
+            return;
+        };
+        let labels: Vec<&str> = self.legend.iter().map(|entry| entry.label.as_str()).collect();
+        let size = legend::size(&labels);
+        let frame = [width - LEFT_MARGIN - self.right_margin, height - TOP_MARGIN - BOTTOM_MARGIN];
+        for _ in 0..MOST_ROOM {
+            let (x, y, log_x) = (&self.x, &self.y, self.log_x);
+            let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
+            let place = |[at_x, at_y]: [f64; 2]| {
+                let across = if log_x {
+                    share(at_x.ln(), x.min.ln(), x.max.ln())
+                } else {
+                    share(at_x, x.min, x.max)
+                };
+                [across, 1.0 - share(at_y, y.min, y.max)]
+            };
+            let (free, covered) = legend::corner(&self.inked, corner, size, frame, place);
+            corner = free;
+            self.legend_position = corner.position();
+            if covered == 0 {
+                return;
+            }
+            self.y.max += self.y.step;
+        }
     }
 }
 

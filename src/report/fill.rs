@@ -4,11 +4,16 @@ use minijinja::value::Value;
 use minijinja::{Environment, UndefinedBehavior, context};
 
 use super::text::clean;
-use super::{Provenance, ReportError};
+use super::{Provenance, ReportError, links};
 
 /// Macros that the pages import under this name.
 const SHARED: (&str, &str) = ("shared.html", include_str!("../../templates/report/shared.html"));
-const STYLE: &str = include_str!("../../templates/report/style.css");
+const CITE: (&str, &str) = ("cite.html", include_str!("../../templates/report/cite.html"));
+const STYLE: &str = concat!(
+    include_str!("../../templates/report/style.css"),
+    include_str!("../../templates/report/dark.css"),
+    include_str!("../../templates/report/print.css"),
+);
 
 /// Lists that are longer than this start folded.
 pub(super) const OPEN_LIMIT: usize = 6;
@@ -18,6 +23,7 @@ pub(super) fn fill(name: &str, page: &str, values: Value) -> Result<String, Repo
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.add_template(SHARED.0, SHARED.1)?;
+    environment.add_template(CITE.0, CITE.1)?;
     environment.add_template(name, page)?;
     Ok(environment.get_template(name)?.render(values)?)
 }
@@ -42,5 +48,6 @@ pub(super) fn common(provenance: &Provenance) -> Value {
         inputs_open => inputs.len() <= OPEN_LIMIT,
         inputs,
         kuva => kuva::VERSION,
+        links => links::values(&provenance.links),
     }
 }

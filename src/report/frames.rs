@@ -3,7 +3,7 @@
 
 use crate::analysis::result::UpdraftMap;
 
-use super::axis::nice_step;
+use super::axis;
 use super::surface::Surface;
 use super::text::usable;
 
@@ -127,9 +127,7 @@ fn scale_end(mut sizes: Vec<f64>) -> f64 {
     sizes.sort_by(f64::total_cmp);
     let place = (SHARE_ON_SCALE * sizes.len() as f64).ceil() as usize;
     let largest = sizes.get(place.saturating_sub(1)).copied().unwrap_or(0.0).max(LEAST_MPS);
-    // A fifth of the step of an axis of five steps: finer than 1, 2, 5.
-    let step = nice_step(largest / 5.0);
-    (largest / step).ceil() * step
+    axis::scale_end(largest)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The top of the page: a sentence and the numbers that matter.
+//! The numbers that matter, at the top of the page, and a sentence of statistics for each flight.
 
 use std::fmt::Write as _;
 
@@ -6,22 +6,21 @@ use minijinja::context;
 use minijinja::value::Value;
 
 use crate::analysis::law::Symbol;
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::analysis::table::{Quantity, TableLaw};
 use crate::analysis::{LawKind, prefer};
 use crate::base::estimate::Estimate;
 
-use super::compare::{better_words, drones_of, flags, nothing};
+use super::compare::{better_words, drones_of, flags};
 use super::figures::air;
 use super::fleet_air::fleet_air;
 use super::headline;
 use super::law;
+use super::opening::SUMMED_FLIGHTS;
 use super::page::capitalised;
 use super::posterior;
-use super::text::{clean, count, error_of, fixed, signed, unit, usable, value_of};
+use super::text::{clean, count, decimal_places, error_of, fixed, signed, unit, usable, value_of};
 
-/// More flights than this are summed up at the top of the page.
-const SUMMED_FLIGHTS: usize = 3;
 /// Label of a W* that is none.
 const VERTEX: &str = "vertex of the fitted parabola, no air speed";
 
@@ -64,29 +63,63 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
         tile(fixed(rms, 3), "rms of W* − true W".to_owned(), note);
     }
     for flight in &analysis.flights {
-        let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
-        let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
-        let note = format!("{}{spread}", air.error.words(2)).replace("95 %", "95\u{a0}%");
-        tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
-        if let Some(fleet) = flight.map.as_ref().and_then(posterior::fleet) {
-            let label = format!("posterior mean, {}", clean(&flight.name));
-            let note = posterior::interval(fleet).replace("95 %", "95\u{a0}%");
-            tile(value_of(fleet), label, note);
-        }
-        if let Some(rms) = air.rms_error {
-            // Of values over 10 s it is another number, which the text below the map tells.
-            let note = format!(
-                "m/s, of the mean of {}",
-                if air.n == 1 {
-                    "the drone".to_owned()
-                } else {
-                    format!("each of {}", count(air.n, "drone"))
-                }
-            );
-            tile(fixed(rms, 3), "rms error of means over the hover".to_owned(), note);
+        for (value, label, note) in air_tiles(flight) {
+            tile(value, label, note.replace("95 %", "95\u{a0}%"));
         }
     }
     tiles
+}
+
+/// Tiles of a map: all drones together where there is a posterior, and then each drone alone beside it.
+fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
+    let Some((map, air)) = flight.map.as_ref().and_then(|map| Some((map, fleet_air(map)?))) else {
+        return Vec::new();
+    };
+    let mut tiles = Vec::new();
+    let name = clean(&flight.name);
+    let together = posterior::fleet(map);
+    if let Some(fleet) = together {
+        tiles.push((
+            signed(fleet.value, decimal_places(fleet)),
+            format!("mean vertical air speed, {name}: all drones together"),
+            format!("± {} m/s; {}", error_of(fleet), posterior::interval(fleet)),
+        ));
+    }
+    let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
+    let whose = if together.is_some() { ": each drone alone, averaged" } else { "" };
+    tiles.push((
+        signed(air.mean, decimal_places(Estimate::new(air.mean, air.error.se))),
+        format!("mean vertical air speed, {name}{whose}"),
+        format!("{}{spread}", air.error.words(2)),
+    ));
+    if let Some(alone) = air.rms_error {
+        // Of values over 10 s it is another number, which the text below the map tells.
+        let of = if air.n == 1 {
+            "of the drone's mean".to_owned()
+        } else {
+            format!("of the means of {} places", air.n)
+        };
+        let label = format!("rms error {of}");
+        let against = if flight.simulated { "simulated air" } else { "instrument's values" };
+        tiles.push(match together.and_then(|_| together_error(map)) {
+            Some(error) => (
+                fixed(error, 2),
+                format!("{label}: all drones together"),
+                format!("m/s, against the {against}; each drone alone: {}", fixed(alone, 2)),
+            ),
+            None => (fixed(alone, 2), label, format!("m/s, against the {against}")),
+        });
+    }
+    tiles
+}
+
+/// Root mean square over drones of the posterior's mean minus the true mean, m/s.
+fn together_error(map: &UpdraftMap) -> Option<f64> {
+    let squares = map.drones.iter().filter_map(|drone| {
+        let error = drone.posterior_mean?.value - air::mean_truth(drone)?;
+        usable(error).then_some(error * error)
+    });
+    air::mean(squares).map(f64::sqrt)
 }
 
 /// Root mean square of fitted minus true updraft over all fits of several calibrations, and their
@@ -153,67 +186,45 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
         .collect()
 }
 
-/// One sentence for each flight, or one for many.
-pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
-    if analysis.flights.is_empty() {
-        return vec!["There is no flight in this analysis.".to_owned()];
+/// A flight in a sentence of statistics, below its heading.
+pub(super) fn summary(flight: &FlightAnalysis) -> String {
+    let mut text = format!("{} analysed", capitalised(&drones_of(flight)));
+    let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
+    if fitted > 0 {
+        let _ = write!(text, ", laws fitted for {fitted}");
     }
-    if analysis.flights.len() > SUMMED_FLIGHTS {
-        let drones = || analysis.flights.iter().flat_map(|flight| &flight.drones);
-        let fitted = drones().filter(|drone| drone.laws.is_some()).count();
-        return vec![format!(
-            "{} with {} analysed, laws fitted for {fitted}.",
-            count(analysis.flights.len(), "flight"),
-            count(drones().count(), "log"),
-        )];
+    if let Some(words) = better_words(flight) {
+        let _ = write!(text, ", {words}");
     }
-    analysis
-        .flights
-        .iter()
-        .map(|flight| {
-            let name = capitalised(&clean(&flight.name));
-            let mut text = format!("{name}: {} analysed", drones_of(flight));
-            let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
-            if fitted > 0 {
-                let _ = write!(text, ", laws fitted for {fitted}");
-            }
-            if let Some(words) = better_words(flight) {
-                let _ = write!(text, ", {words}");
-            }
-            if let Some(words) = headline::held_words(flight) {
-                let _ = write!(text, ", {words}");
-            }
-            if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
-                let _ = if air.n == 1 {
-                    write!(text, ", vertical air speed {} m/s", signed(air.mean, 2))
-                } else {
-                    write!(
-                        text,
-                        ", vertical air speed from {} to {} m/s over the grid",
-                        signed(air.lowest, 2),
-                        signed(air.highest, 2),
-                    )
-                };
-            }
-            if let Some(words) = flight.map.as_ref().and_then(posterior::headline) {
-                let _ = write!(text, ", {words}");
-            }
-            let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
-            if noted > 0 {
-                let _ = write!(text, ", {} with notes", count(noted, "drone"));
-            }
-            if !flight.unmeasured.is_empty() {
-                let _ = write!(
-                    text,
-                    ", {} without a value in the map",
-                    count(flight.unmeasured.len(), "drone")
-                );
-            }
-            text.push('.');
-            if let Some(words) = nothing(flight) {
-                let _ = write!(text, " {words}");
-            }
-            text
-        })
-        .collect()
+    if let Some(words) = headline::held_words(flight) {
+        let _ = write!(text, ", {words}");
+    }
+    if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
+        let _ = if air.n == 1 {
+            write!(text, ", vertical air speed {} m/s", signed(air.mean, 2))
+        } else {
+            write!(
+                text,
+                ", vertical air speed from {} to {} m/s over the grid (each drone alone)",
+                signed(air.lowest, 2),
+                signed(air.highest, 2),
+            )
+        };
+    }
+    if let Some(words) = flight.map.as_ref().and_then(posterior::headline) {
+        let _ = write!(text, ", {words}");
+    }
+    let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
+    if noted > 0 {
+        let _ = write!(text, ", {} with notes", count(noted, "drone"));
+    }
+    if !flight.unmeasured.is_empty() {
+        let _ = write!(
+            text,
+            ", {} without a value in the map",
+            count(flight.unmeasured.len(), "drone")
+        );
+    }
+    text.push('.');
+    text
 }

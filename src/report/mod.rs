@@ -11,6 +11,7 @@
 
 mod axis;
 mod chart;
+mod cite;
 mod colour;
 mod compare;
 mod compare_page;
@@ -34,9 +35,12 @@ mod gap_words;
 mod glance;
 mod headline;
 mod law;
+mod legend;
+mod links;
 pub mod next_terminal;
 mod notes;
 mod offset_field;
+mod opening;
 mod page;
 mod page_air;
 mod page_flight;
@@ -72,6 +76,7 @@ pub use compare_page::render_comparison;
 pub use compare_terminal::comparison_summary;
 pub use gap_page::render_gap;
 pub use gap_terminal::gap_summary;
+pub use links::PageLink;
 pub use sensitivity_page::render_sensitivity;
 pub use sensitivity_points::Points;
 pub use sensitivity_terminal::sensitivity_summary;
@@ -101,6 +106,10 @@ pub struct Provenance {
     pub settings: Vec<(String, String)>,
     /// Files that the analysis read.
     pub inputs: Vec<InputFile>,
+    /// SHA-256 of the numbers' file, `analysis.json`, hexadecimal; `None`: not known.
+    pub analysis_sha256: Option<String>,
+    /// Pages and files that belong to the report.
+    pub links: Vec<PageLink>,
 }
 
 /// One input file of an analysis.

@@ -4,7 +4,7 @@
 use crate::analysis::offset::OffsetMap;
 use crate::analysis::result::FlightAnalysis;
 
-use super::axis::{Axis, nice_step};
+use super::axis::{Axis, scale_end};
 use super::raster::Pixel;
 use super::text::usable;
 
@@ -35,11 +35,10 @@ impl OffsetScale {
         let heights = windows().map(|w| w.height_m).chain(points().map(|p| p.height_m));
         let largest =
             points().map(|p| p.offset_us.abs()).filter(|us| usable(*us)).fold(LEAST_US, f64::max);
-        let step = nice_step(largest / 5.0);
         Some(Self {
             time: Axis::time(ends.chain(points().map(|p| p.time_s))),
-            height: Axis::around("height (m)", heights, 10.0),
-            limit_us: (largest / step).ceil() * step,
+            height: Axis::heights(heights),
+            limit_us: scale_end(largest),
             unit: flight.indicator.unit(),
         })
     }

@@ -6,8 +6,10 @@ use minijinja::value::Value;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::study::result::StudyResult;
 
+use super::cite::citation;
 use super::figures::{laws as figure_laws, study as figure_study};
 use super::fill::{OPEN_LIMIT, common, fill};
+use super::opening::Opening;
 use super::page_air::air_section;
 use super::page_flight::flight_section;
 use super::study_page::law_table;
@@ -33,7 +35,6 @@ pub(super) fn render(
         .enumerate()
         .filter_map(|(index, flight)| air_section(analysis, flight, index, &mut figures))
         .collect();
-    // In the order of the page: a figure is numbered as it is shown.
     let laws = figure_laws::figure(analysis).map(|figure| figures.show(figure));
     let study = study.map(|study| study_section(study, &mut figures));
     let flights: Vec<Value> = analysis
@@ -44,14 +45,16 @@ pub(super) fn render(
         .collect();
     let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(&w.to_string())).collect();
     let title = clean(&analysis.title);
+    let title = if title.trim().is_empty() { "Updraft report".to_owned() } else { title };
     let values = context! {
-        title => if title.trim().is_empty() { "Updraft report".to_owned() } else { title },
+        opening => Opening::of(analysis).value(),
+        cite => citation(analysis, &title, provenance),
+        title,
         script => Value::from_safe_string(SCRIPTS.concat()),
         made_by => clean(&analysis.made_by),
         schema => clean(&analysis.schema),
         seed => provenance.seed.map(|seed| seed.to_string()),
         made_at => clean(&provenance.made_at),
-        verdict => glance::verdict(analysis),
         tiles => glance::tiles(analysis),
         warnings_open => warnings.len() <= OPEN_LIMIT,
         warnings,
@@ -65,10 +68,9 @@ pub(super) fn render(
     Ok(Report { html, figures: figures.files })
 }
 
-/// Numbers the figures of the page and collects their files.
+/// Names the figures of the page as their files are named, and collects the files.
 #[derive(Default)]
 pub(super) struct Gallery {
-    numbered: usize,
     pub(super) files: Vec<(String, String)>,
 }
 
@@ -84,11 +86,10 @@ impl Gallery {
         value
     }
 
-    /// Numbers a figure and keeps its file.
+    /// Labels a figure and keeps its file.
     pub(super) fn show(&mut self, figure: Figure) -> Value {
-        self.numbered += 1;
         let value = context! {
-            number => self.numbered,
+            label => label(&figure.name),
             name => figure.name.clone(),
             title => figure.title,
             caption => figure.caption,
@@ -97,6 +98,14 @@ impl Gallery {
         self.files.push((figure.name, figure.svg));
         value
     }
+}
+
+/// What a figure is called on every page: as its file, `5-hover` for `fig5-hover.svg` and `map-hover` for
+/// `map-hover.svg`.
+pub(super) fn label(name: &str) -> &str {
+    name.strip_prefix("fig")
+        .filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+        .unwrap_or(name)
 }
 
 /// The paper's Fig. 2 and Table I, from the study that the campaign holds.

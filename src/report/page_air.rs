@@ -69,7 +69,15 @@ pub(super) fn air_section(
     let between = frames.as_ref().zip(field.as_ref());
     let more: Vec<Value> = [
         still,
-        between.and_then(|(frames, field)| posterior::figure(flight, &key, frames, field)),
+        between.and_then(|(frames, field)| {
+            posterior::figure(
+                flight,
+                &key,
+                frames,
+                field,
+                figure_map::scale_of(map, Means::Posterior),
+            )
+        }),
         track::figure(flight, &key, map),
         air::figure(flight, &key, map),
         levelled::figure(flight, &key, map),

@@ -16,6 +16,7 @@ use super::drone_table::drone_table;
 use super::figures::drone::{Axes, drawable};
 use super::figures::{drone as figure_drone, fleet};
 use super::fill::OPEN_LIMIT;
+use super::glance;
 use super::law;
 use super::notes::{
     logs_used, partly_used_lines, shared_notes, unused_lines, without_result_lines,
@@ -85,6 +86,7 @@ pub(super) fn flight_section(
     context! {
         id => format!("flight-{}", index + 1),
         heading => capitalised(if name.is_empty() { purpose(flight.purpose) } else { &name }),
+        summary => glance::summary(flight),
         purpose => purpose(flight.purpose),
         drones => drones_of(flight),
         empty => flight.drones.is_empty(),
@@ -130,7 +132,7 @@ struct Gallery3 {
 }
 
 /// Figure 3 for every drone of a calibration, the first with laws shown first; that one is not
-/// numbered yet.
+/// shown yet.
 fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> Option<Gallery3> {
     let moving = |drone| law::moving(drone).next().is_some();
     let wanted: Vec<usize> = (0..flight.drones.len())

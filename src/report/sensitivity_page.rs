@@ -7,6 +7,7 @@ use crate::study::sensitivity::{Influence, OutcomeResult, SensitivityResult};
 
 use super::figures::sensitivity::figures;
 use super::fill::{common, fill};
+use super::page::label;
 use super::sensitivity_terminal::{
     campaigns, capital, decimals, explained, in_order, numbers, spread,
 };
@@ -32,10 +33,9 @@ pub fn render_sensitivity(
     let figures = figures(study, points);
     let shown: Vec<Value> = figures
         .iter()
-        .enumerate()
-        .map(|(index, figure)| {
+        .map(|figure| {
             context! {
-                number => index + 1,
+                label => label(&figure.name),
                 name => figure.name.clone(),
                 title => figure.title.clone(),
                 caption => figure.caption.clone(),

@@ -4,7 +4,7 @@ use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{FieldStatistics, Scale};
 
 use super::scales::{not_determined, true_air_words};
-use super::text::clean;
+use super::text::{clean, p_value};
 
 /// Length, time scale, and the two directions; or why there is nothing of the kind.
 pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
@@ -53,7 +53,7 @@ fn directions(statistics: &FieldStatistics) -> Option<String> {
         .filter(|_| determined)
         .map_or_else(String::new, |p| {
             let significant = if p < 0.05 { "significant" } else { "not significant" };
-            format!("; the difference is {significant} (p = {p:.2})")
+            format!("; the difference is {significant} ({})", p_value(p))
         });
     Some(format!(
         "λ along x {}, along y {}{differ}",

@@ -8,6 +8,7 @@ use crate::study::result::StudyResult;
 
 use super::figures::study::{self as figure_study, rho};
 use super::fill::{common, fill};
+use super::page::label;
 use super::study_terminal::{ConditionWords, range_rows, windows};
 use super::text::{NONE, clean, count, estimate, symbol, unit};
 use super::{Provenance, Report, ReportError};
@@ -22,10 +23,9 @@ pub fn render_study(study: &StudyResult, provenance: &Provenance) -> Result<Repo
     let figures = figure_study::figures(study);
     let shown: Vec<Value> = figures
         .iter()
-        .enumerate()
-        .map(|(index, figure)| {
+        .map(|figure| {
             context! {
-                number => index + 1,
+                label => label(&figure.name),
                 name => figure.name.clone(),
                 title => figure.title.clone(),
                 caption => figure.caption.clone(),

@@ -112,6 +112,26 @@ pub(super) fn estimate(estimate: Estimate) -> String {
     }
 }
 
+/// Decimals that an estimate is told with.
+pub(super) fn decimal_places(of: Estimate) -> usize {
+    of.decimals().map_or(3, |decimals| decimals.min(4))
+}
+
+/// [`estimate`] with a plus sign for what is above zero.
+pub(super) fn signed_estimate(of: Estimate) -> String {
+    if !usable(of.value) {
+        return fixed(of.value, 2);
+    }
+    let decimals = decimal_places(of);
+    let error = if usable(of.se) { fixed(of.se, decimals) } else { UNKNOWN.to_owned() };
+    format!("{} ± {error}", signed(of.value, decimals))
+}
+
+/// A p-value: never smaller than what is printed of it.
+pub(super) fn p_value(p: f64) -> String {
+    if p < 0.01 { "p < 0.01".to_owned() } else { format!("p = {}", fixed(p, 2)) }
+}
+
 /// A value without its error, to the digit that the error supports.
 pub(super) fn value_of(of: Estimate) -> String {
     value_and_error(of).0
@@ -253,6 +273,22 @@ mod tests {
         assert_eq!(signed(0.001, 2), "0.00");
         assert_eq!(fixed(f64::NAN, 2), "not a number");
         assert_eq!(fixed(1e300, 2), "1.00e300");
+    }
+
+    #[test]
+    fn a_p_value_is_never_zero() {
+        assert_eq!(
+            [0.0, 0.004, 0.01, 0.199].map(p_value),
+            ["p < 0.01", "p < 0.01", "p = 0.01", "p = 0.20"]
+        );
+    }
+
+    #[test]
+    fn signs_do_not_stand_before_zero() {
+        let words = |value, se| signed_estimate(Estimate::new(value, se));
+        assert_eq!(words(2.8261, 0.231), "+2.83 ± 0.23");
+        assert_eq!(words(-0.0004, 0.23), "0.00 ± 0.23");
+        assert_eq!(words(-0.15, f64::NAN), "−0.150 ± unknown");
     }
 
     #[test]

@@ -49,6 +49,7 @@ pub mod hidden;
 pub mod host;
 pub(crate) mod live;
 pub mod mission;
+mod pages;
 pub mod physics;
 pub mod plan;
 mod provenance;

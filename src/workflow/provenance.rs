@@ -34,9 +34,9 @@ pub(crate) fn provenance(
         program: made_by(),
         command: host.command(),
         seed: work.flights.iter().find_map(|flight| flight.seed),
-        made_at: String::new(),
         settings: settings.into_iter().map(|(what, how)| (what.to_owned(), how)).collect(),
         inputs,
+        ..Provenance::default()
     }
 }
 

@@ -6,6 +6,7 @@ use super::clock::Stopwatch;
 use super::error::WorkflowError;
 use super::host::Host;
 use super::made_by;
+use super::pages;
 use super::share::{self, ShardDone, on_threads};
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
@@ -142,11 +143,13 @@ pub fn write(
 ) -> Result<PathBuf, WorkflowError> {
     let json = to_json(result)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
-    let provenance =
-        Provenance { program: made_by(), command, seed: Some(seed), ..Provenance::default() };
-    let made = report::render_study(result, &provenance)?;
-    let pages = folder.join("report");
     write_whole(&folder.join(RESULT_FILE), &json)?;
-    report::write(&made, &pages)?;
-    Ok(pages.join(report::PAGE_FILE))
+    let links = pages::of_study(folder, &[("All numbers of this page", RESULT_FILE)]);
+    let program = made_by();
+    let provenance =
+        Provenance { program, command, seed: Some(seed), links, ..Provenance::default() };
+    let made = report::render_study(result, &provenance)?;
+    let report_folder = folder.join("report");
+    report::write(&made, &report_folder)?;
+    Ok(report_folder.join(report::PAGE_FILE))
 }

@@ -173,7 +173,7 @@ for (const film of document.querySelectorAll(".film")) {
       small,
       pixels: new ImageData(columns, rows),
       of,
-      heading: canvas.closest(".screen").querySelector("h4"),
+      heading: canvas.closest(".screen").querySelector("h3"),
       limit: of === "difference" ? data.difference_limit : data.limit,
     };
   });
@@ -374,7 +374,7 @@ for (const film of document.querySelectorAll(".film")) {
     const control = event.target.closest("button, select, input");
     const range = control === slider;
     if (event.key === " " && (!control || range)) toggle();
-    else if (control) return;
+    else if (control && !range) return;
     else if (event.key === "ArrowRight") jump(frame + 1);
     else if (event.key === "ArrowLeft") jump(frame - 1);
     else if (event.key === "PageDown") jump(frame + 10);

@@ -10,14 +10,15 @@ for (const gallery of document.querySelectorAll(".gallery")) {
   const link = figure.querySelector("figcaption a");
   const first = select.value;
   const kept = drawing.firstElementChild;
-  const number = title.textContent.split(".")[0];
   const show = () => {
     const template = [...gallery.querySelectorAll("template")].find((t) => t.dataset.name === select.value);
     if (template) drawing.replaceChildren(template.content.cloneNode(true));
     else if (select.value === first) drawing.replaceChildren(kept);
     const label = drawing.querySelector("title");
-    title.textContent = number + ". " + (label ? label.textContent : "") + ".";
-    link.href = "figures/" + select.value + ".svg";
+    title.textContent = "Figure " + select.value.replace(/^fig(?=\d)/, "") + ". " + (label ? label.textContent : "") + ".";
+    drawing.setAttribute("aria-label", label ? label.textContent : "");
+    link.textContent = select.value + ".svg";
+    link.href = "figures/" + link.textContent;
   };
   select.addEventListener("change", show);
   const fleet = gallery.closest("section").querySelector("svg a[data-drone]")?.closest("svg");

@@ -11,6 +11,9 @@ const TRIM_DEG: f64 = 0.2;
 /// Steepest lean that is taken for wind: its tangent. Convention.
 const STEEPEST: f64 = 2.0;
 
+/// How well a vehicle's file knows its drag, as a share of the wind's speed.
+pub const DRAG_SHARE: f64 = 1.0 / 3.0;
+
 /// Mean lean of one drone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeanLean {
@@ -48,12 +51,19 @@ impl LeanDrag<'_> {
         }
     }
 
+    /// A speed with the error that the drag adds: digits that the drag does not support are none.
+    fn with_own_error(self, speed: Estimate) -> Estimate {
+        match self {
+            Self::Table(_) => Estimate::new(speed.value, speed.se.hypot(DRAG_SHARE * speed.value)),
+            _ => speed,
+        }
+    }
+
     /// In words, what the speed rests on.
     fn words(self) -> &'static str {
         match self {
             Self::Table(_) => {
-                "the drag of rotors and body in the vehicle's own physics, which a file alone knows to a third \
-                 (the ± is the spread of the drones alone)"
+                "the drag of rotors and body in the vehicle's own physics, which a file alone knows to a third"
             }
             _ => "the vehicle's drag",
         }
@@ -125,10 +135,15 @@ pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
     );
     let words = match (speed_mps, drag.speed_mps(TRIM_DEG.to_radians().tan())) {
         (Some(speed), Some(trim)) => format!(
-            "wind {speed} m/s{from}, from a mean lean of {} degrees and {} (a trim error of \
+            "wind {} m/s{from}, from a mean lean of {} degrees and {}{} (a trim error of \
              {TRIM_DEG} degrees alone would read as {} m/s in calm air)",
+            drag.with_own_error(speed),
             digits(lean_deg),
             drag.words(),
+            match drag {
+                LeanDrag::Table(_) => format!("; the drones agree to ± {} m/s", digits(speed.se)),
+                _ => String::new(),
+            },
             digits(trim)
         ),
         _ => format!(

@@ -85,11 +85,7 @@ impl Axes {
                 [middle - 1.5 * pulse_limit, middle + 1.5 * pulse_limit].into_iter(),
                 20.0,
             ),
-            height: Axis::around(
-                "height (m)",
-                traces().flat_map(|trace| trace.height_m.iter().copied()),
-                10.0,
-            ),
+            height: Axis::heights(traces().flat_map(|trace| trace.height_m.iter().copied())),
             law_velocity: Axis::around(
                 VELOCITY_LABEL,
                 marks().flat_map(|mark| [mark.x - mark.x_error, mark.x + mark.x_error]),

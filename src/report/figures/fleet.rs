@@ -102,7 +102,8 @@ pub(in crate::report) fn figure(
         ),
     };
     Some(Figure {
-        svg: drawing.finish(&title),
+        // A picture holds nothing to be focused; this one has links.
+        svg: drawing.finish(&title).replacen("role=\"img\"", "role=\"group\"", 1),
         name,
         title,
         caption: format!(

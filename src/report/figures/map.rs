@@ -9,8 +9,18 @@ use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, count, estimate, fixed, signed, usable};
 
-/// Above so many drones the cells are too small for text.
-const TEXT_LIMIT: usize = 400;
+/// Narrowest cell that holds a readable value, pixels, and one that holds its error and the slot as well.
+const VALUE_PX: f64 = 38.0;
+const ERROR_PX: f64 = 56.0;
+
+/// What the cells are wide enough for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Room {
+    /// Decimals of a value; absent: colours alone.
+    decimals: Option<usize>,
+    /// Whether error and slot stand beside it.
+    all: bool,
+}
 
 /// Whose means the squares show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,40 +81,36 @@ pub(in crate::report) fn mean_map(
     let (top, room) = if truth_known { (40.0, [424.0, 424.0]) } else { (16.0, [800.0, 620.0]) };
     let projection = Projection::new(&positions, [70.0, top], room, 0.5)?;
     let [width, height] = projection.size();
-    let limit = limit(
-        map.drones
-            .iter()
-            .map(|drone| means.of(drone).value)
-            .chain(filled.iter().map(|(_, mean)| *mean))
-            .chain(truths.iter().copied().flatten()),
-    );
+    let limit = scale_of(map, means);
     let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
     let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
-    let with_text = positions.len() <= TEXT_LIMIT;
+    let cell_px = positions.first().map_or(0.0, |place| projection.cell(*place)[2]);
     // As many decimals as the largest error asks for, the same in all cells.
     let largest = map.drones.iter().map(|drone| means.of(drone).se).filter(|se| usable(*se));
-    let decimals = with_text.then(|| error_decimals(largest.fold(0.0, f64::max)));
+    let decimals = error_decimals(largest.fold(0.0, f64::max));
+    let decimals = (cell_px >= VALUE_PX).then_some(decimals);
+    let text = Room { decimals, all: cell_px >= ERROR_PX };
     for (slot, home) in &empty {
-        empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
+        empty_cell(&mut drawing, *slot, projection.cell(*home), text);
     }
     for drone in &map.drones {
         if let Some(place) = position(drone) {
             let cell = projection.cell(place);
-            mean_cell(&mut drawing, drone, means.of(drone), cell, limit, decimals);
+            mean_cell(&mut drawing, drone, means.of(drone), cell, limit, text);
         }
     }
     for (drone, mean) in &filled {
-        filled_cell(&mut drawing, drone, *mean, projection.cell(drone.position_m), limit, decimals);
+        filled_cell(&mut drawing, drone, *mean, projection.cell(drone.position_m), limit, text);
     }
     axes(&mut drawing, &projection);
     if truth_known {
         let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
         for (slot, home) in &empty {
-            empty_cell(&mut drawing, *slot, aside.cell(*home), with_text);
+            empty_cell(&mut drawing, *slot, aside.cell(*home), text);
         }
         for (drone, truth) in map.drones.iter().zip(&truths) {
             if let (Some(place), Some(truth)) = (position(drone), truth) {
-                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, decimals);
+                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, text);
             }
         }
         let estimated = match means {
@@ -144,6 +150,14 @@ pub(in crate::report) fn mean_map(
     } else {
         ""
     };
+    let numbers = if text.all {
+        " with its standard error below, m/s, up positive, and the slot in the corner"
+    } else if text.decimals.is_some() {
+        ", m/s, up positive; point at a square for its drone and its standard error"
+    } else {
+        ", m/s, up positive. There are too many for numbers: point at a square for its drone, its value and its \
+         standard error, which the table of all drones holds, too"
+    };
     let (what, lost) = match (means, filled.len()) {
         (Means::Alone, _) => ("", ""),
         (Means::Posterior, 0) => {
@@ -160,11 +174,24 @@ pub(in crate::report) fn mean_map(
         title,
         caption: format!(
             "The grid seen from above, one square for each of {}: the mean vertical air speed \
-             over the hover{what} with its standard error below, m/s, up positive. Red is rising air, \
-             blue sinking, white none; the small number is the slot.{beside}{lost}{dashed}",
+             over the hover{what}{numbers}. Red is rising air, blue sinking, white none.{beside}{lost}{dashed}",
             count(positions.len() - empty.len() - filled.len(), "drone"),
         ),
     })
+}
+
+/// End of the symmetric scale of the means, of the truth beside them and of filled places, m/s.
+pub(in crate::report) fn scale_of(map: &UpdraftMap, means: Means) -> f64 {
+    let posterior = map.posterior.as_ref().filter(|_| means == Means::Posterior);
+    let filled =
+        posterior.into_iter().flat_map(|posterior| posterior.filled.iter().filter_map(filled));
+    limit(
+        map.drones
+            .iter()
+            .map(|drone| means.of(drone).value)
+            .chain(filled.map(|(_, mean)| mean))
+            .chain(map.drones.iter().filter_map(mean_truth)),
+    )
 }
 
 /// The true mean in a square.
@@ -174,22 +201,22 @@ fn true_cell(
     truth: f64,
     [x, y, w, h]: [f64; 4],
     limit: f64,
-    decimals: Option<usize>,
+    text: Room,
 ) {
     drawing.open(&format!("{}: true mean {} m/s", clean(&drone.name), signed(truth, 3)));
     let fill = diverging(truth / limit);
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
-    if let Some(decimals) = decimals {
+    if let Some(decimals) = text.decimals {
         let colour = ink_on_diverging(truth / limit);
         let size = (w * 0.23).min(20.0);
         let style = TextStyle { size, bold: true, colour, anchor: Anchor::Middle };
-        let text = signed(truth, decimals);
-        drawing.text([x + w / 2.0, y + h * 0.56], &text, style, 0.0);
+        let value = signed(truth, decimals);
+        drawing.text([x + w / 2.0, y + h * 0.56], &value, style, 0.0);
     }
     drawing.close();
 }
 
-fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], with_text: bool) {
+fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], text: Room) {
     let label = slot.map(|slot| slot.to_string());
     drawing
         .open(&label.as_ref().map_or("no data".to_owned(), |slot| format!("slot {slot}: no data")));
@@ -198,7 +225,7 @@ fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], 
         "#fafbfc",
         &format!("stroke=\"{FAINT}\" stroke-dasharray=\"4 3\""),
     );
-    if with_text {
+    if text.all {
         let style = |size, anchor| TextStyle { size, bold: false, colour: MUTED, anchor };
         let middle = [x + w / 2.0, y + h * 0.56];
         drawing.text(middle, "no data", style((w * 0.155).min(13.0), Anchor::Middle), 0.0);
@@ -223,19 +250,23 @@ fn filled_cell(
     mean: f64,
     [x, y, w, h]: [f64; 4],
     limit: f64,
-    decimals: Option<usize>,
+    text: Room,
 ) {
     let place = mean / limit;
     let label = drone.slot.to_string();
     drawing.open(&format!("slot {label}: {} m/s, by its neighbours", signed(mean, 3)));
     let frame = format!("rx=\"2\" stroke=\"{INK}\" stroke-dasharray=\"2 3\"");
     drawing.rect([x + 2.0, y + 2.0, w - 4.0, h - 4.0], &diverging(place), &frame);
-    if let Some(decimals) = decimals {
+    if let Some(decimals) = text.decimals {
         let colour = ink_on_diverging(place);
         let style = |size, bold, anchor| TextStyle { size, bold, colour, anchor };
         let middle = [x + w / 2.0, y + h * 0.56];
-        let text = signed(mean, decimals);
-        drawing.text(middle, &text, style((w * 0.23).min(20.0), true, Anchor::Middle), 0.0);
+        let value = signed(mean, decimals);
+        drawing.text(middle, &value, style((w * 0.23).min(20.0), true, Anchor::Middle), 0.0);
+        if !text.all {
+            drawing.close();
+            return;
+        }
         let below = [x + w / 2.0, y + h * 0.79];
         drawing.text(below, "no log", style((w * 0.155).min(13.0), false, Anchor::Middle), 0.0);
         let corner = [x + w * 0.07, y + h * 0.2];
@@ -250,7 +281,7 @@ fn mean_cell(
     mean: Estimate,
     [x, y, w, h]: [f64; 4],
     limit: f64,
-    decimals: Option<usize>,
+    text: Room,
 ) {
     let place = mean.value / limit;
     let fill = if usable(mean.value) { diverging(place) } else { "#ffffff".to_owned() };
@@ -261,17 +292,18 @@ fn mean_cell(
         drone.mapping.name(),
     ));
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
-    if let Some(decimals) = decimals {
+    if let Some(decimals) = text.decimals {
         let colour = if usable(mean.value) { ink_on_diverging(place) } else { MUTED };
         let style = |size: f64, bold| TextStyle { size, bold, colour, anchor: Anchor::Middle };
-        let text = if usable(mean.value) { signed(mean.value, decimals) } else { "n/a".to_owned() };
-        drawing.text([x + w / 2.0, y + h * 0.56], &text, style((w * 0.23).min(20.0), true), 0.0);
-        if usable(mean.se) && mean.se > 0.0 {
-            let text = format!("±{}", fixed(mean.se, decimals));
+        let value =
+            if usable(mean.value) { signed(mean.value, decimals) } else { "n/a".to_owned() };
+        drawing.text([x + w / 2.0, y + h * 0.56], &value, style((w * 0.23).min(20.0), true), 0.0);
+        if text.all && usable(mean.se) && mean.se > 0.0 {
+            let error = format!("±{}", fixed(mean.se, decimals));
             let at = [x + w / 2.0, y + h * 0.79];
-            drawing.text(at, &text, style((w * 0.155).min(13.0), false), 0.0);
+            drawing.text(at, &error, style((w * 0.155).min(13.0), false), 0.0);
         }
-        if let Some(slot) = drone.slot {
+        if let Some(slot) = drone.slot.filter(|_| text.all) {
             let small = TextStyle { anchor: Anchor::Start, ..style((w * 0.13).min(10.0), false) };
             drawing.text([x + w * 0.07, y + h * 0.2], &slot.to_string(), small, 0.0);
         }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis};
 use crate::numeric::extent;
-use crate::report::axis::{decimals_of, nice_step};
+use crate::report::axis::{decimals_of, nice_step, scale_end};
 use crate::report::colour::{FAINT, INK, MUTED, diverging};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{fixed, signed, usable};
@@ -98,9 +98,7 @@ pub(super) fn position(drone: &DroneUpdraft) -> Option<[f64; 2]> {
 
 /// A round number around all values: the scale is symmetric.
 pub(super) fn limit(values: impl Iterator<Item = f64>) -> f64 {
-    let largest = values.filter(|&v| usable(v)).map(f64::abs).fold(0.01, f64::max);
-    let step = nice_step(largest / 5.0);
-    (largest / step).ceil() * step
+    scale_end(values.filter(|&v| usable(v)).map(f64::abs).fold(0.01, f64::max))
 }
 
 /// Where each slot stands, as far as any flight of the analysis knows.

@@ -4,7 +4,7 @@ use super::evolution::{marks, pixels, rings};
 use super::plan_view::{Projection, axes, narrow_bar};
 use crate::analysis::result::FlightAnalysis;
 use crate::report::Figure;
-use crate::report::axis::{decimals_of, nice_step};
+use crate::report::axis::{decimals_of, scale_end};
 use crate::report::colour::{INK, diverging, sequential};
 use crate::report::frames::Frames;
 use crate::report::posterior_grid::{Cells, GridField};
@@ -25,9 +25,11 @@ pub(in crate::report) fn figure(
     key: &str,
     frames: &Frames<'_>,
     field: &GridField<'_>,
+    means_limit: f64,
 ) -> Option<Figure> {
     let (mean, sd) = (field.mean(), field.sd());
-    let mean_limit = limit(&mean)?;
+    // The scale of the means at the drones, so that one colour is one speed on both.
+    let mean_limit = limit(&mean)?.max(means_limit);
     let sd_limit = limit(&sd)?;
     let places: Vec<[f64; 2]> = frames.places.iter().flatten().copied().collect();
     let lost = frames.lost();
@@ -77,7 +79,7 @@ pub(in crate::report) fn figure(
         name,
         title,
         caption: format!(
-            "(a) Mean of the posterior over the flight, from above, forward is up; red is rising air. (b) Its standard \
+            "(a) Mean of the posterior over the flight, from above, forward is up; red is rising air, on the scale of the means at the drones. (b) Its standard \
              deviation for the mean of 10 s at one time, root mean square over the flight: all origins of error are in \
              it, also those that all places share. Crosses are drones{rings}; hatched: not known."
         ),
@@ -87,6 +89,5 @@ pub(in crate::report) fn figure(
 /// A round number around all sizes; `None` without any.
 fn limit(cells: &Cells) -> Option<f64> {
     let largest = cells.iter().flatten().flatten().map(|w| w.abs()).reduce(f64::max)?.max(0.01);
-    let step = nice_step(largest / 5.0);
-    Some((largest / step).ceil() * step)
+    Some(scale_end(largest))
 }

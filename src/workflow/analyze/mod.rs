@@ -18,7 +18,9 @@ pub use self::settings::{Settings, Uncorrected};
 use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{Found, Work, find, lean_tables};
+use super::hashes::Hashes;
 use super::host::Host;
+use super::pages;
 use super::provenance::provenance;
 use crate::analysis::battery::Sag;
 use crate::analysis::combine;
@@ -184,6 +186,7 @@ fn input<'a>(
         purpose: flight.purpose,
         logs: &flight.logs,
         start: flight.start,
+        simulated: flight.simulated,
         true_updraft_mps: flight.true_updraft_mps,
         truth: (!flight.truth.is_empty()).then_some(&flight.truth),
         density: flight.density.filter(|_| !without.density),
@@ -223,15 +226,20 @@ impl Analysed {
     ///
     /// If they cannot be made or written.
     pub fn write(&self, host: &dyn Host, folder: &Path) -> Result<Option<PathBuf>, WorkflowError> {
-        let unknown = Provenance::default();
-        let provenance = self.provenance.as_ref().unwrap_or(&unknown);
         let study = read_study(host, &self.root);
         let report_folder = folder.join("report");
-        let (page_made, numbers_made) = rayon::join(
-            || write_report(&self.analysis, study.as_ref(), provenance, &report_folder),
-            || write_numbers(&self.analysis, folder),
+        // The page tells the hash of the numbers, which come first; the tables are written beside it.
+        let numbers = write_numbers(&self.analysis, folder)?;
+        let provenance = Provenance {
+            analysis_sha256: Some(Hashes::default().sha256(&numbers)?),
+            links: pages::of_report(&self.root, folder, &self.analysis),
+            ..self.provenance.clone().unwrap_or_default()
+        };
+        let (page_made, fields_made) = rayon::join(
+            || write_report(&self.analysis, study.as_ref(), &provenance, &report_folder),
+            || write_fields(&self.analysis, folder),
         );
-        page_made.and(numbers_made)?;
+        page_made.and(fields_made)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
     }
@@ -287,11 +295,12 @@ fn write_report(
     Ok(report::write(&made, folder)?)
 }
 
-/// All numbers, and the field of the map as tables.
-fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<(), WorkflowError> {
+/// All numbers; the path of their file.
+fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<PathBuf, WorkflowError> {
+    let path = folder.join("analysis.json");
     // Streamed: that of a thousand drones has a hundred megabytes.
-    write_with(&folder.join("analysis.json"), |out| write_json(out, analysis))?;
-    write_fields(analysis, folder)
+    write_with(&path, |out| write_json(out, analysis))?;
+    Ok(path)
 }
 
 /// The calibration whose A and u0 are held.

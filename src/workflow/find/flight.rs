@@ -79,6 +79,7 @@ pub(super) fn found_flight(
         purpose: Some(plan.purpose),
         plan: Some(plan),
         logs,
+        simulated: at.origin == LogOrigin::Simulated,
         true_updraft_mps: record
             .as_ref()
             .filter(|record| record.air.is_empty())

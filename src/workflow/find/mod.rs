@@ -53,6 +53,8 @@ pub struct Found {
     pub purpose: Option<Purpose>,
     /// Logs of the flight, in the order of their paths.
     pub logs: Vec<LogInput>,
+    /// Whether the logs are of the simulator.
+    pub simulated: bool,
     /// True vertical speed of uniform air, m/s, up positive (simulated flights).
     pub true_updraft_mps: Option<f64>,
     /// True vertical speed of the air at each slot's planned place (simulated flights).

@@ -15,6 +15,7 @@ use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{Found, Work};
 use super::host::Host;
+use super::pages;
 use super::provenance::provenance;
 use crate::base::digest::sha256_of_files;
 use crate::base::file::{create_folder, write_whole};
@@ -106,8 +107,11 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
     let root = root.cloned().unwrap_or_default();
     let settings = settings(request, &found, &vehicle);
     let work = Work { flights: vec![found], ..Work::new(&root) };
-    let provenance =
-        Provenance { seed: Some(request.options.seed), ..provenance(host, &work, settings) };
+    let provenance = Provenance {
+        seed: Some(request.options.seed),
+        links: pages::of_gap(&folder, request.campaign.as_deref()),
+        ..provenance(host, &work, settings)
+    };
     explained.verdict.data.logs_sha256 = logs_sha256(&work)?;
     let page = write(&folder, &explained, &provenance)?;
     for reason in said_together(&explained.verdict.data.left_out) {

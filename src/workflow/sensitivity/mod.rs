@@ -10,6 +10,7 @@ use self::campaign::Campaigns;
 use super::error::WorkflowError;
 use super::host::Host;
 use super::made_by;
+use super::pages;
 use super::share::{self, ShardDone, numbers, on_threads};
 use crate::base::file::{write_whole, write_with};
 use crate::base::shard::{Shard, Share};
@@ -162,10 +163,19 @@ pub fn write(
     let json = to_json(result)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
     write_whole(&folder.join(RESULT_FILE), &json)?;
+    let links = pages::of_study(
+        folder,
+        &[
+            ("All numbers of this page", RESULT_FILE),
+            ("Every campaign, as a table", "results.csv"),
+            ("The same in Parquet", "results.parquet"),
+        ],
+    );
     let provenance = Provenance {
         program: made_by(),
         command,
         seed: Some(result.seed),
+        links,
         ..Provenance::default()
     };
     let points = report::Points::of(study, &drawn, &gathered.rows);

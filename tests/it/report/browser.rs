@@ -89,7 +89,7 @@ fn the_film_shows_the_posterior_and_at_a_click_each_drone_alone() {
     write(&made, &folder).expect("written");
     let address = format!("file://{}", folder.join("index.html").display());
     let mut tab = browser.open(&address, [1280, 900]);
-    let heading = "document.querySelector('.film h4').textContent";
+    let heading = "document.querySelector('.film h3').textContent";
     let reading = "document.querySelector('.film .reading').textContent";
     let picture = "document.querySelector('.film canvas').toDataURL()";
     assert_eq!(tab.text(heading), "Posterior W");

@@ -163,6 +163,7 @@ fn origin(address: &str) -> Option<String> {
 pub(crate) enum Key {
     Right,
     Home,
+    PageDown,
     Space,
     Enter,
     Tab,
@@ -253,6 +254,7 @@ impl Tab<'_> {
         let (name, code, text, number) = match key {
             Key::Right => ("ArrowRight", "ArrowRight", "", 39),
             Key::Home => ("Home", "Home", "", 36),
+            Key::PageDown => ("PageDown", "PageDown", "", 34),
             Key::Space => (" ", "Space", " ", 32),
             Key::Enter => ("Enter", "Enter", "\r", 13),
             Key::Tab => ("Tab", "Tab", "", 9),
@@ -281,6 +283,11 @@ impl Tab<'_> {
     pub(crate) fn dark(&mut self) {
         let feature = json!({ "name": "prefers-color-scheme", "value": "dark" });
         self.call("Emulation.setEmulatedMedia", &json!({ "features": [feature] }));
+    }
+
+    /// Shows the page as on paper.
+    pub(crate) fn print_media(&mut self) {
+        self.call("Emulation.setEmulatedMedia", &json!({ "media": "print" }));
     }
 
     /// Asks for less motion, as a reader's system settings may.

@@ -1,6 +1,7 @@
 //! The page, its figures and tables, the terminal.
 
 mod browser;
+mod browser_access;
 pub(crate) mod chromium;
 mod fields;
 mod gap;

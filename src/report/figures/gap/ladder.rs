@@ -82,8 +82,9 @@ fn pulses(verdict: &Verdict, x: &Axis) -> Panel {
     let before: Vec<(f64, f64)> =
         rungs.iter().map(|rung| (rung.climb_mps, rung.before_us)).collect();
     let after: Vec<(f64, f64)> = rungs.iter().map(|rung| (rung.climb_mps, rung.after_us)).collect();
-    panel.line(&before, BEFORE.0, 1.6, "6 4");
+    // Where both are the same, both are seen: dashes over a line.
     panel.line(&after, AFTER.0, 1.6, "");
+    panel.line(&before, BEFORE.0, 1.6, "6 4");
     let marks: Vec<Mark> = rungs
         .iter()
         .map(|rung| Mark {

@@ -49,12 +49,13 @@ fn residuals(panel: &mut Panel, rows: &[&Regime], bar_width: f64, chance: bool) 
     }
     let before: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.before_us.0)).collect();
     let after: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.after_us)).collect();
-    // Where both are the same, both are seen.
+    // Where both are the same, both are seen: dashes over a line, dots on squares.
+    // Places and drones have no order to follow.
+    if chance {
+        panel.line(&after, AFTER.0, 1.3, "");
+        panel.line(&before, BEFORE.0, 1.3, "4 4");
+    }
     for (points, (colour, shape), size) in [(before, BEFORE, 4.8), (after, AFTER, 3.2)] {
-        // Places and drones have no order to follow.
-        if chance {
-            panel.line(&points, colour, 1.1, "");
-        }
         let marks: Vec<Mark> = points.into_iter().map(point).collect();
         panel.marks(&marks, colour, size, shape);
     }

@@ -13,8 +13,8 @@ use rand::Rng as _;
 use updraft::analysis::law::{LawOf, Symbol};
 use updraft::analysis::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, Fit, FitWarning,
-    FlightAnalysis, Laws, Missing, Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured,
-    UpdraftMap, WindowStats,
+    FlightAnalysis, FlightSite, Laws, Missing, Parameter, Rejection, SampleStats, TableRow, Trace,
+    Unmeasured, UpdraftMap, WindowStats,
 };
 use updraft::analysis::table::{PaperTable, Quantity, TableLaw};
 use updraft::analysis::{Cause, LawKind, Warning};
@@ -103,7 +103,12 @@ pub(crate) fn provenance() -> Provenance {
                 sha256: format!("{i:02x}").repeat(32),
             })
             .collect(),
+        ..Provenance::default()
     }
+}
+
+fn site() -> FlightSite {
+    FlightSite { lat_deg: 47.4733, lon_deg: 19.0621, ground_amsl_m: Some(190.0), planned: true }
 }
 
 fn home(slot: u16) -> [f64; 2] {
@@ -140,6 +145,8 @@ pub(crate) fn calibration(
         purpose: Purpose::Calibration,
         planned: true,
         orientation_deg: Some(30.0),
+        site: Some(site()),
+        simulated: true,
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),
@@ -466,6 +473,8 @@ pub(crate) fn hover() -> FlightAnalysis {
         purpose: Purpose::Measurement,
         planned: true,
         orientation_deg: Some(30.0),
+        site: Some(site()),
+        simulated: true,
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),

@@ -1,0 +1,116 @@
+//! What is needed to cite a measurement: what, where, when, how, with which program, from which files.
+
+use std::fmt::Write as _;
+
+use minijinja::context;
+use minijinja::value::Value;
+
+use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::base::digest::sha256;
+
+use super::opening::{day_and_time, site_words, when};
+use super::page::capitalised;
+use super::text::{clean, count};
+use super::{InputFile, Provenance};
+
+/// Inputs that are listed one by one; logs are told by their number and the hash of the list.
+const LISTED: [&str; 5] =
+    ["plan.json", "vehicle.toml", "campaign.json", "study.json", "manifest.json"];
+/// Most of them.
+const MOST_LISTED: usize = 12;
+
+/// The section.
+pub(super) fn citation(analysis: &Analysis, title: &str, provenance: &Provenance) -> Value {
+    let simulated = analysis.flights.iter().any(|flight| flight.simulated);
+    let flights: Vec<Value> = analysis.flights.iter().take(MOST_LISTED).map(flight_line).collect();
+    let site = analysis.flights.iter().find_map(|flight| flight.site.as_ref()).map(site_words);
+    let is_listed = |input: &&InputFile| {
+        LISTED.iter().any(|name| input.path == *name || input.path.ends_with(&format!("/{name}")))
+    };
+    let listed: Vec<Value> = provenance
+        .inputs
+        .iter()
+        .filter(is_listed)
+        .take(MOST_LISTED)
+        .map(|input| context! { path => clean(&input.path), sha256 => clean(&input.sha256) })
+        .collect();
+    let day = analysis.flights.iter().find_map(|flight| {
+        let when = when(flight)?;
+        Some(day_and_time(when.unix_s(when.span_s[0])?).0)
+    });
+    let logs: usize = analysis.flights.iter().map(|flight| flight.logs).sum();
+    context! {
+        line => line(analysis, title, day.as_deref(), site.as_deref(), provenance),
+        site,
+        simulated,
+        more_flights => analysis.flights.len().saturating_sub(MOST_LISTED),
+        flights,
+        logs => count(logs, "log"),
+        files => count(provenance.inputs.len(), "file"),
+        inputs_sha256 => (!provenance.inputs.is_empty()).then(|| list_sha256(&provenance.inputs)),
+        analysis_sha256 => provenance.analysis_sha256.as_deref().map(clean),
+        listed,
+    }
+}
+
+/// The measurement in one reference.
+fn line(
+    analysis: &Analysis,
+    title: &str,
+    day: Option<&str>,
+    site: Option<&str>,
+    provenance: &Provenance,
+) -> String {
+    let kind = if analysis.flights.iter().any(|flight| flight.simulated) {
+        "simulated vertical air speed from rotor effort"
+    } else {
+        "vertical air speed from rotor effort"
+    };
+    let mut line = format!("{title}: {kind}");
+    for part in [day, site].into_iter().flatten() {
+        let _ = write!(line, ", {part}");
+    }
+    let program =
+        if provenance.program.is_empty() { &analysis.made_by } else { &provenance.program };
+    let _ = write!(line, ". Analysed with {}", clean(program));
+    if let Some(hash) = &provenance.analysis_sha256 {
+        let _ = write!(line, "; analysis.json, SHA-256 {}", clean(hash));
+    }
+    line.push('.');
+    line
+}
+
+fn flight_line(flight: &FlightAnalysis) -> Value {
+    let time = when(flight).and_then(|when| {
+        let [from, to] = when.span_s.map(|s| when.unix_s(s));
+        let ((day, from), (_, to)) = (day_and_time(from?), day_and_time(to?));
+        Some(format!("{day} {from} to {to} UTC"))
+    });
+    context! {
+        name => capitalised(&clean(&flight.name)),
+        time,
+        drones => count(flight.drones.len(), "drone"),
+    }
+}
+
+/// SHA-256 of the lines `HASH  PATH` of all inputs by path, as `sha256sum` writes them.
+fn list_sha256(inputs: &[InputFile]) -> String {
+    let mut lines: Vec<(&str, &str)> =
+        inputs.iter().map(|input| (input.path.as_str(), input.sha256.as_str())).collect();
+    lines.sort_unstable();
+    let text: String = lines.iter().map(|(path, hash)| format!("{hash}  {path}\n")).collect();
+    sha256(text.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_of_inputs_is_that_of_sha256sums_list() {
+        let input =
+            |path: &str, sha256: &str| InputFile { path: path.into(), sha256: sha256.into() };
+        let both = [input("b/2.BIN", "22"), input("a/1.BIN", "11")];
+        assert_eq!(list_sha256(&both), sha256(b"11  a/1.BIN\n22  b/2.BIN\n"));
+    }
+}

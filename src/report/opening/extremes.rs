@@ -1,0 +1,121 @@
+//! The strongest and the weakest air: where, and when.
+
+use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
+use crate::base::estimate::Estimate;
+use crate::numeric::median;
+use crate::report::text::{clean, fixed, signed_estimate, usable};
+
+use super::air::compass;
+use super::place::{When, day_and_time, when};
+
+/// Standard errors to each side of a normal 95 % interval.
+const NORMAL: f64 = 1.96;
+/// A drone closer to the origin than this stands on it, m.
+const AT_ORIGIN_M: f64 = 1.0;
+
+/// Sentences on both.
+pub(super) fn extremes(flight: &FlightAnalysis, map: &UpdraftMap) -> Vec<String> {
+    let mut said = Vec::new();
+    let places = map.drones.iter().filter_map(|drone| {
+        let mean = drone.posterior_mean.unwrap_or(drone.mean);
+        usable(mean.value).then_some((mean, drone))
+    });
+    if let Some([(high, at_high), (low, at_low)]) = ends(places) {
+        let at = |drone: &DroneUpdraft| place(flight, drone);
+        said.push(format!(
+            "Over the whole time the air was highest at {} with {} m/s and lowest at {} with {} m/s.{}",
+            at(at_high),
+            signed_estimate(high),
+            at(at_low),
+            signed_estimate(low),
+            if is_shared(map) {
+                " All drones share most of these errors: differences between them are known better."
+            } else {
+                ""
+            },
+        ));
+    }
+    let when = when(flight);
+    let seconds = map.drones.iter().flat_map(|drone| {
+        map.time_s.iter().enumerate().filter_map(move |(index, time_s)| {
+            let value = second(drone, index)?;
+            usable(value.value).then_some((value, (drone, *time_s)))
+        })
+    });
+    if let Some([(high, at_high), (low, at_low)]) = ends(seconds) {
+        let at = |(drone, time_s): (&DroneUpdraft, f64)| {
+            format!("{} at {}", label(drone), moment(when, time_s))
+        };
+        said.push(format!(
+            "The strongest 10 s were {} m/s ({}), the weakest {} m/s ({}).",
+            signed_estimate(high),
+            at(at_high),
+            signed_estimate(low),
+            at(at_low),
+        ));
+    }
+    said
+}
+
+/// The highest and the lowest; `None` below two.
+fn ends<T: Copy>(
+    values: impl Iterator<Item = (Estimate, T)> + Clone,
+) -> Option<[(Estimate, T); 2]> {
+    let by = |a: &(Estimate, T), b: &(Estimate, T)| a.0.value.total_cmp(&b.0.value);
+    if values.clone().nth(1).is_none() {
+        return None;
+    }
+    Some([values.clone().max_by(by)?, values.min_by(by)?])
+}
+
+/// One second's value with all of its error: the posterior's where there is one.
+fn second(drone: &DroneUpdraft, index: usize) -> Option<Estimate> {
+    let at = |values: &[Option<f64>]| values.get(index).copied().flatten();
+    if let Some((value, se)) = at(&drone.posterior_mps).zip(at(&drone.posterior_sd_mps)) {
+        return Some(Estimate::new(value, se));
+    }
+    let value = at(&drone.updraft_mps)?;
+    let interval = drone.interval_mps.get(index).copied().flatten();
+    let se = interval.map_or(f64::NAN, |[low, high]| (high - low) / (2.0 * NORMAL));
+    Some(Estimate::new(value, se))
+}
+
+/// Whether most of a middle drone's error is the fleet's.
+fn is_shared(map: &UpdraftMap) -> bool {
+    let Some(common) = map.common.filter(|common| usable(common.se_mps)) else { return false };
+    let errors = map.drones.iter().map(|drone| drone.mean.se).filter(|se| usable(*se));
+    median(errors.collect()).is_some_and(|one| common.se_mps.powi(2) > one.powi(2) / 2.0)
+}
+
+fn label(drone: &DroneUpdraft) -> String {
+    let name = clean(&drone.name);
+    match drone.slot {
+        Some(slot) if name.is_empty() => format!("slot {slot}"),
+        _ => name,
+    }
+}
+
+/// `Drone 15, 12 m north-west of the show's origin`
+fn place(flight: &FlightAnalysis, drone: &DroneUpdraft) -> String {
+    let where_it_is =
+        drone.position_m.filter(|_| drone.track_m.is_empty()).zip(flight.orientation_deg);
+    let Some(([x, y], forward_deg)) =
+        where_it_is.filter(|(p, deg)| usable(p[0] + p[1]) && usable(*deg))
+    else {
+        return label(drone);
+    };
+    let distance = x.hypot(y);
+    if distance < AT_ORIGIN_M {
+        return format!("{} (on the show's origin)", label(drone));
+    }
+    let bearing = forward_deg - y.atan2(x).to_degrees();
+    format!("{} ({} m {} of the show's origin)", label(drone), fixed(distance, 0), compass(bearing))
+}
+
+/// `12:03:20 UTC`, else `96 s of show time`.
+fn moment(when: Option<When>, time_s: f64) -> String {
+    when.and_then(|when| when.unix_s(time_s)).map_or_else(
+        || format!("{} s of show time", fixed(time_s, 0)),
+        |unix_s| format!("{} UTC", day_and_time(unix_s).1),
+    )
+}

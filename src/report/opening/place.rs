@@ -1,0 +1,186 @@
+//! Where and when it was, how many drones flew, and for how long.
+
+use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis, FlightSite};
+use crate::base::calendar::date;
+use crate::base::time::GpsTime;
+use crate::mission::plan::Purpose;
+use crate::numeric::{extent, upper_median};
+use crate::report::page::capitalised;
+use crate::report::text::{clean, count, fixed, purpose, usable};
+
+use super::SUMMED_FLIGHTS;
+
+/// Places closer than this are one, degrees of latitude or longitude (a hundred metres or less).
+const SAME_PLACE_DEG: f64 = 0.001;
+/// Heights closer than this are one height, m.
+const SAME_HEIGHT_M: f64 = 3.0;
+
+/// When steady flight was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::report) struct When {
+    /// Show time 0 by most logs; absent: no log has GPS time.
+    pub(in crate::report) zero: Option<GpsTime>,
+    /// First and last second of the windows, show time s.
+    pub(in crate::report) span_s: [f64; 2],
+}
+
+impl When {
+    /// Unix time of a show time, s; `None` where logs do not tell.
+    pub(in crate::report) fn unix_s(self, show_s: f64) -> Option<i64> {
+        let zero = self.zero?.to_unix_ms();
+        usable(show_s).then(|| zero.saturating_add((1000.0 * show_s) as i64).div_euclid(1000))
+    }
+
+    /// Length, s.
+    pub(in crate::report) fn length_s(self) -> f64 {
+        self.span_s[1] - self.span_s[0]
+    }
+}
+
+/// When the windows of a flight were flown; `None` without windows.
+pub(in crate::report) fn when(flight: &FlightAnalysis) -> Option<When> {
+    let ends = |drone: &DroneAnalysis| {
+        let used = |window: &crate::analysis::result::WindowStats| [window.start_s, window.end_s];
+        drone.windows.iter().flat_map(used).filter(|s| usable(*s)).collect::<Vec<_>>()
+    };
+    let (low, high) = extent(flight.drones.iter().flat_map(ends))?;
+    let starts = flight.drones.iter().filter_map(|drone| drone.clock.start);
+    let zero = upper_median(starts.map(|start| start.total_ms() as f64).collect())
+        .and_then(|ms| GpsTime::from_total_ms(ms as i64));
+    Some(When { zero, span_s: [low, high] })
+}
+
+/// `47.4733° N, 19.0621° E, ground 190 m above sea level`
+pub(in crate::report) fn site_words(site: &FlightSite) -> String {
+    let side = |deg: f64, sides: [&str; 2]| {
+        format!("{}° {}", fixed(deg.abs(), 4), sides[usize::from(deg < 0.0)])
+    };
+    let ground = site.ground_amsl_m.filter(|m| usable(*m));
+    let ground =
+        ground.map_or_else(String::new, |m| format!(", ground {} m above sea level", fixed(m, 0)));
+    format!("{}, {}{ground}", side(site.lat_deg, ["N", "S"]), side(site.lon_deg, ["E", "W"]))
+}
+
+/// Date and time of day of Unix seconds: `2026-06-01` and `12:00:18`.
+pub(in crate::report) fn day_and_time(unix_s: i64) -> (String, String) {
+    let (days, second) = (unix_s.div_euclid(86_400), unix_s.rem_euclid(86_400));
+    let (year, month, day) = date(days);
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    (format!("{year:04}-{month:02}-{day:02}"), format!("{hour:02}:{minute:02}:{second:02}"))
+}
+
+/// The first sentences.
+pub(super) fn circumstances(analysis: &Analysis) -> Vec<String> {
+    let flights = &analysis.flights;
+    if flights.is_empty() {
+        return vec!["There is no flight in this analysis.".to_owned()];
+    }
+    let mut said = vec![format!("{} {}.", flown(flights), place(flights))];
+    if flights.len() <= SUMMED_FLIGHTS {
+        said.extend(flights.iter().map(flight_sentence));
+    }
+    if flights.iter().any(|flight| flight.simulated) {
+        said.push(
+            if flights.iter().all(|flight| flight.simulated) {
+                "Nothing was flown outdoors: drones, air and clock are the simulator's."
+            } else {
+                "Of simulated flights, drones, air and clock are the simulator's."
+            }
+            .to_owned(),
+        );
+    }
+    said
+}
+
+/// `Two simulated flights of 16 drones`
+fn flown(flights: &[FlightAnalysis]) -> String {
+    let simulated = flights.iter().filter(|flight| flight.simulated).count();
+    let used = || flights.iter().map(|flight| flight.drones.len());
+    let (fewest, most) = (used().min().unwrap_or(0), used().max().unwrap_or(0));
+    let drones = if fewest == most {
+        count(most, "drone")
+    } else {
+        format!("{fewest} to {}", count(most, "drone"))
+    };
+    match (flights.len(), simulated) {
+        (1, 0) => format!("A flight of {drones}"),
+        (1, _) => format!("A simulated flight of {drones}"),
+        (2, 0) => format!("Two flights of {drones}"),
+        (n, 0) => format!("{n} flights of {drones}"),
+        (2, 2) => format!("Two simulated flights of {drones}"),
+        (n, all) if n == all => format!("{n} simulated flights of {drones}"),
+        (n, some) => format!("{n} flights of {drones}, {some} of them simulated,"),
+    }
+}
+
+fn place(flights: &[FlightAnalysis]) -> String {
+    let sites: Vec<FlightSite> = flights.iter().filter_map(|flight| flight.site).collect();
+    let Some(first) = sites.first() else {
+        return "at a place that neither a plan nor the logs tell".to_owned();
+    };
+    let near = |site: &FlightSite| {
+        (site.lat_deg - first.lat_deg).abs() < SAME_PLACE_DEG
+            && (site.lon_deg - first.lon_deg).abs() < SAME_PLACE_DEG
+    };
+    // A plan knows the ground's height, which first fixes do not.
+    let shown = sites.iter().find(|site| site.planned).unwrap_or(first);
+    let of = if shown.planned { "" } else { " (the drones' first fixes)" };
+    let apart = if sites.iter().all(near) {
+        ""
+    } else {
+        ", and elsewhere: the flights are of several places"
+    };
+    format!("at {}{of}{apart}", site_words(shown))
+}
+
+/// `Hover: 2026-06-02 12:00 to 12:02 UTC, 1 min 49 s at 100 m above the ground, by 15 of 16 drones.`
+fn flight_sentence(flight: &FlightAnalysis) -> String {
+    let name = clean(&flight.name);
+    let name = capitalised(if name.is_empty() { purpose(flight.purpose) } else { &name });
+    let of = flight.drones.len() + flight.missing.len();
+    let drones = if of > flight.drones.len() {
+        format!(", with logs of {} of {}", flight.drones.len(), count(of, "drone"))
+    } else {
+        String::new()
+    };
+    let Some(when) = when(flight) else {
+        return format!("{name}: nothing steady was flown{drones}.");
+    };
+    let clock = match (when.unix_s(when.span_s[0]), when.unix_s(when.span_s[1])) {
+        (Some(from), Some(to)) => {
+            let ((day, from), (last_day, to)) = (day_and_time(from), day_and_time(to));
+            let to = if day == last_day { to } else { format!("{last_day} {to}") };
+            format!("{day} {from} to {to} UTC")
+        }
+        _ => "when is not known (the logs have no GPS time)".to_owned(),
+    };
+    let what = match flight.purpose {
+        Purpose::Calibration => " of climbs and descents".to_owned(),
+        Purpose::Measurement => heights(flight),
+    };
+    format!("{name}: {clock}, {}{what}{drones}.", duration(when.length_s()))
+}
+
+/// ` at 100 m above the ground`
+fn heights(flight: &FlightAnalysis) -> String {
+    let Some(map) = &flight.map else { return String::new() };
+    let all = map.drones.iter().map(|drone| drone.height_m).filter(|m| usable(*m));
+    let Some((low, high)) = extent(all) else { return String::new() };
+    let moved = if map.is_scan() { " on tracks" } else { "" };
+    if high - low < SAME_HEIGHT_M {
+        format!("{moved} at {} m above take-off", fixed(f64::midpoint(low, high), 0))
+    } else {
+        format!("{moved} at {} to {} m above take-off", fixed(low, 0), fixed(high, 0))
+    }
+}
+
+/// `1 min 49 s`
+pub(super) fn duration(seconds: f64) -> String {
+    let whole = seconds.round().max(0.0);
+    let (minutes, rest) = ((whole / 60.0).floor(), whole % 60.0);
+    match (minutes > 0.0, rest > 0.0) {
+        (false, _) => format!("{} s", fixed(rest, 0)),
+        (true, false) => format!("{} min", fixed(minutes, 0)),
+        (true, true) => format!("{} min {} s", fixed(minutes, 0), fixed(rest, 0)),
+    }
+}

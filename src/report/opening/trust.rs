@@ -1,0 +1,150 @@
+//! What to distrust most, in words, the worst first.
+
+use crate::analysis::Warning;
+use crate::analysis::WindHandled;
+use crate::analysis::result::{Analysis, CommonError, FlightAnalysis, UpdraftMap};
+use crate::report::page::capitalised;
+use crate::report::text::{clean, count, fixed, sentence, usable};
+
+/// Doubts that are told at the top; the others are counted.
+const MOST: usize = 4;
+/// True values inside 95 % intervals below which the intervals are called too narrow.
+const LEAST_INSIDE: f64 = 0.85;
+
+/// How bad a doubt is, and its words.
+type Doubt = (u8, String);
+
+/// The largest doubts about an analysis.
+pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
+    let several = analysis.flights.len() > 1;
+    let mut doubts: Vec<Doubt> =
+        analysis.warnings.iter().map(|warning| (0, sentence(&warning.to_string()))).collect();
+    for flight in &analysis.flights {
+        let of = |(badness, words): Doubt| {
+            (
+                badness,
+                if several {
+                    format!("{}: {words}", capitalised(&clean(&flight.name)))
+                } else {
+                    words
+                },
+            )
+        };
+        doubts.extend(lost(flight).map(of));
+        doubts.extend(flight.warnings.iter().filter_map(doubt).map(of));
+        doubts.extend(flight.map.as_ref().and_then(largest_error).map(of));
+        doubts.extend(flight.map.as_ref().and_then(too_narrow).map(of));
+    }
+    // Equals stay in the order of the flights.
+    doubts.sort_by_key(|doubt| doubt.0);
+    let left = doubts.len().saturating_sub(MOST);
+    let mut said: Vec<String> = doubts.into_iter().take(MOST).map(|doubt| doubt.1).collect();
+    if left > 0 {
+        said.push(format!("{} more with the flights below.", count(left, "caution")));
+    }
+    said
+}
+
+/// Drones without a result.
+fn lost(flight: &FlightAnalysis) -> Option<Doubt> {
+    let lost = flight.missing.len() + flight.unmeasured.len();
+    let of = flight.missing.len() + flight.drones.len();
+    if lost == 0 || of == 0 {
+        return None;
+    }
+    let badness = if 2 * lost >= of { 0 } else { 5 };
+    Some((badness, format!("{lost} of {} gave no result.", count(of, "drone"))))
+}
+
+/// The largest part of the error that all drones share.
+fn largest_error(map: &UpdraftMap) -> Option<Doubt> {
+    let common = map.common.as_ref().filter(|common| usable(common.se_mps))?;
+    let parts: [(fn(&CommonError) -> f64, &str); 5] = [
+        (
+            |c| c.zero_mps,
+            "the zero: the air may have risen or sunk slowly while the drones were calibrated",
+        ),
+        (
+            |c| c.battery_mps,
+            "the batteries: what their voltage does to the effort beyond its correction",
+        ),
+        (|c| c.wind_mps, "the wind: what it does to leaning drones beyond its correction"),
+        (|c| c.density_mps, "the air's density: what it does to the effort beyond its correction"),
+        (|c| c.law_mps, "the drones' laws: noise and turbulence while they were calibrated"),
+    ];
+    let known =
+        parts.into_iter().map(|(of, words)| (of(common), words)).filter(|part| usable(part.0));
+    let (size, words) = known.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|part| part.0 > 0.0)?;
+    let beside = if map.posterior.as_ref().is_some_and(|posterior| posterior.fleet.is_some()) {
+        " before drones and seconds are taken together"
+    } else {
+        ""
+    };
+    Some((
+        2,
+        format!(
+            "Most of what all drones share of the error ({} of {} m/s{beside}) is {words}. It shifts the \
+             whole map alike; differences between drones are free of it.",
+            fixed(size, 2),
+            fixed(common.se_mps, 2),
+        ),
+    ))
+}
+
+/// Intervals that the true air of a simulated flight leaves too often.
+fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
+    let posterior = map.posterior.as_ref().and_then(|posterior| posterior.truth);
+    let truth = posterior.or(map.truth).filter(|truth| truth.values > 0)?;
+    (usable(truth.inside_share) && truth.inside_share < LEAST_INSIDE).then(|| {
+        (
+            1,
+            format!(
+                "The errors are too small here: only {} % of the true values lie inside their 95 % intervals.",
+                fixed(100.0 * truth.inside_share, 0)
+            ),
+        )
+    })
+}
+
+/// A warning as a doubt of the first page; `None`: told elsewhere, or of no weight for the air.
+fn doubt(warning: &Warning) -> Option<Doubt> {
+    let own = || sentence(&warning.to_string());
+    Some(match warning {
+        Warning::WhoseLogs(_) | Warning::Failed(_) => (0, own()),
+        Warning::NoLaw | Warning::NoFlock(_) | Warning::NoCalibration | Warning::NoLadder { .. } => (1, own()),
+        Warning::FewWindows { .. } | Warning::FleetLadder { .. } | Warning::OtherStart { .. } => (2, own()),
+        Warning::PlainMap | Warning::Battery { .. } => (3, own()),
+        Warning::Wind { corrected, error_mps, .. } => (
+            if *corrected == WindHandled::Not { 2 } else { 4 },
+            match corrected {
+                WindHandled::Not => format!(
+                    "Nothing is corrected for wind: it may read as sinking air by up to {} m/s.",
+                    fixed(*error_mps, 2)
+                ),
+                WindHandled::Physics | WindHandled::Drag => format!(
+                    "Wind on the leaning drones is corrected for, but {} m/s may be left, of one sign for all.",
+                    fixed(*error_mps, 2)
+                ),
+            },
+        ),
+        Warning::PartialLadders { .. } | Warning::Scan => (4, own()),
+        Warning::Misfit { .. } => (
+            6,
+            "The paper's signed-quadratic law does not describe the calibration: read its line, not A, u₀ and W*."
+                .to_owned(),
+        ),
+        Warning::Vertex { .. } => (
+            6,
+            "The W* of the fitted laws is the vertex of a parabola and no air speed.".to_owned(),
+        ),
+        Warning::LadderWind { axial_mps, .. } => (
+            5,
+            format!(
+                "Wind while climbing and sinking may make up {} m/s of the laws' own W*.",
+                fixed(*axial_mps, 2)
+            ),
+        ),
+        Warning::TiltForm { .. } => (7, own()),
+        _ => (3, own()),
+    })
+}
