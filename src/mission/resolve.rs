@@ -374,10 +374,24 @@ fn with_range(
             resolve_flight(path, text, &[number])
             && help.starts_with("allowed: ")
         {
-            return error.with_help(format!("{} is a number; {help}", item.key));
+            let list = Override::new(&item.key, vec![f64::NAN; 2]);
+            let is = if takes(path, text, list) {
+                "a number, or a list of numbers such as [0.5, 1.0, 1.5]"
+            } else {
+                "a number"
+            };
+            return error.with_help(format!("{} is {is}; {help}", item.key));
         }
     }
     error
+}
+
+/// Whether a value of this kind has a place under its key, whatever is wrong with its numbers.
+fn takes(path: &str, text: &str, value: Override) -> bool {
+    matches!(
+        resolve_flight(path, text, &[value]),
+        Err(MissionError::Template(TemplateError { help: Some(help), .. })) if help.starts_with("allowed: ")
+    )
 }
 
 fn vehicle_of(path: &str, text: &str, template: &FlightTemplate) -> Result<Vehicle, MissionError> {

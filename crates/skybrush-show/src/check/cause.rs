@@ -44,12 +44,11 @@ pub fn causes(findings: &[Finding]) -> Vec<Cause<'_>> {
     let mut known: BTreeMap<(Severity, &str, String), usize> = BTreeMap::new();
     for finding in findings {
         let key = (finding.severity, finding.check, without_numbers(&finding.message));
-        match known.get(&key).and_then(|at| causes.get_mut(*at)) {
-            Some(cause) => cause.findings.push(finding),
-            None => {
-                known.insert(key, causes.len());
-                causes.push(Cause { findings: vec![finding] });
-            }
+        if let Some(cause) = known.get(&key).and_then(|at| causes.get_mut(*at)) {
+            cause.findings.push(finding);
+        } else {
+            known.insert(key, causes.len());
+            causes.push(Cause { findings: vec![finding] });
         }
     }
     causes
