@@ -405,7 +405,9 @@ mod tests {
         };
         // 25 independent places have 24 degrees of freedom beside their mean.
         assert!((independent(&grid(1e4), [100.0, 100.0]).unwrap() - 25.0).abs() < 0.1);
-        assert!(independent(&grid(7.0), [145.0, 145.0]).unwrap() < 6.0);
+        // NumPy: 1 + trace(PAP)**2 / trace(PAP @ PAP).
+        let near = independent(&grid(7.0), [145.0, 145.0]).unwrap();
+        assert!((near - 6.805269246629946).abs() < 1e-9, "{near}");
     }
 
     #[test]

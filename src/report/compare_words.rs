@@ -347,16 +347,24 @@ mod tests {
 
     #[test]
     fn a_drone_that_changed_is_told_with_its_number_and_what_to_look_at() {
-        let heavy = law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 0.1, 0.3, 1.0)]);
+        let heavy =
+            law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 0.1, 0.3, 1.0)]);
         assert_eq!(
             drone_sentences(&heavy),
-            ["Drone 107, slot 7 before and 9 now needs 14.2 ± 3.1 µs more in hover than the fleet's change explains (p = \
-              0.0004 among all drones): a weak motor, a propeller, or weight."]
+            [
+                "Drone 107, slot 7 before and 9 now needs 14.2 ± 3.1 µs more in hover than the fleet's change explains (p = \
+              0.0004 among all drones): a weak motor, a propeller, or weight."
+            ]
         );
-        let weak = law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 1.1, 0.3, 0.2)]);
+        let weak =
+            law(&[(Quantity::Hover, 14.2, 3.1, 0.0004), (Quantity::Response, 1.1, 0.3, 0.2)]);
         assert!(drone_sentences(&weak)[0].contains("its response rose, too"));
         let none = law(&[(Quantity::Hover, 4.2, 3.1, 0.7)]);
-        assert!(drone_sentences(&none)[0].starts_with("No drone changed"), "{:?}", drone_sentences(&none));
+        assert!(
+            drone_sentences(&none)[0].starts_with("No drone changed"),
+            "{:?}",
+            drone_sentences(&none)
+        );
     }
 
     #[test]
