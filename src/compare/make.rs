@@ -9,6 +9,7 @@ use super::maps::{self, Calibrations};
 use super::result::{AllEqual, COMPARE_SCHEMA, Comparison, LawComparison, Quantity};
 use super::side::{Couple, FlightOf, Side, couples};
 use super::structure;
+use crate::analysis::LawKind;
 use crate::base::estimate::Estimate;
 use crate::mission::plan::Purpose;
 use crate::numeric::median;
@@ -124,6 +125,7 @@ fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
         match laws_of(couple, choice) {
             Ok(laws) => {
                 note_drones(found, couple, &laws);
+                note_law(found, couple, choice);
                 let hover = laws.fleet.iter().find(|change| change.quantity == Quantity::Hover);
                 scatters.extend(hover.and_then(|change| change.scatter));
                 found.laws.push(laws);
@@ -235,6 +237,24 @@ fn note_alone(found: &mut Comparison, reference: &Side, other: &Side, couples: &
         found
             .not_compared
             .push(format!("{} {verb} no counterpart in the other campaign.", listed(&alone)));
+    }
+}
+
+/// Flights whose windows prefer another law than the one that was asked for.
+fn note_law(found: &mut Comparison, couple: &Couple<'_>, choice: LawChoice) {
+    let asked = match choice {
+        LawChoice::Preferred => return,
+        LawChoice::Linear => LawKind::Linear,
+        LawChoice::SignedQuadratic => LawKind::SignedQuadratic,
+    };
+    for flight in [couple.reference, couple.other] {
+        let headline = flight.flight.headline.as_ref();
+        if let Some(preferred) = headline.map(|headline| headline.law).filter(|law| *law != asked) {
+            found.notes.push(format!(
+                "The windows of {} prefer the {preferred} law: what the {asked} law says of single drones may be chance",
+                flight.id()
+            ));
+        }
     }
 }
 
