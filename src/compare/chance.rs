@@ -36,7 +36,8 @@ pub fn chi2_above(chi2: f64, dof: usize) -> f64 {
     if dof == 0 || !chi2.is_finite() || chi2 < 0.0 {
         return f64::NAN;
     }
-    gamma_ur(dof as f64 / 2.0, chi2 / 2.0)
+    // The function takes no 0.
+    if chi2 > 0.0 { gamma_ur(dof as f64 / 2.0, chi2 / 2.0) } else { 1.0 }
 }
 
 /// Probability of Fisher's F at least so large.
@@ -137,6 +138,7 @@ mod tests {
         close(chi2_above(21.4, 9), 0.010988016145239983);
         close(chi2_above(3.0, 2), 0.22313016014842982);
         close(f_above(3.7, 2.0, 15.2), 0.0490667316956364);
+        assert_eq!((chi2_above(0.0, 2), f_above(0.0, 2.0, 9.0)), (1.0, 1.0));
         assert!(chi2_above(3.0, 0).is_nan() && chi2_above(f64::NAN, 3).is_nan());
     }
 

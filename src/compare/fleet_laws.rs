@@ -199,7 +199,8 @@ fn of_line(line: &BentLine) -> (Parameters, bool) {
 
 /// A fit's parameters without the air that it was flown in; `None` where they mean nothing.
 fn of_fit(kind: LawKind, fit: &Fit) -> Option<Parameters> {
-    if fit.w_beyond_mps.is_some() {
+    // Of several minima nearly as good, chance picks one.
+    if fit.w_beyond_mps.is_some() || !fit.other_minima.is_empty() {
         return None;
     }
     let response = match kind {

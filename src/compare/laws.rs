@@ -158,7 +158,9 @@ pub(super) fn compare(couple: &Couple<'_>, a: &FleetLaws, b: &FleetLaws) -> Opti
         let spread = spread(&changes, basis)?;
         let common = [a, b].map(|laws| variance(&laws.fleet.covariance, gradient));
         let se = (common.iter().sum::<f64>() + spread.median_variance).sqrt();
-        let z = (se > 0.0).then(|| spread.median / se);
+        // The paper's fits take the air that all drones shared for noise of each window.
+        let is_known = a.is_split && b.is_split && se > 0.0;
+        let z = is_known.then(|| spread.median / se);
         fleet.push(FleetChange {
             quantity,
             unit: a.form.unit(quantity, &a.unit),
@@ -300,5 +302,6 @@ pub(super) fn over_all(laws: &[(&FleetLaws, FlightOf<'_>)], scatter: Option<f64>
         Series { drone: Some(key.clone()), values: values.collect(), dof }
     };
     let drones: Vec<Series> = rows.values().map(own).collect();
-    std::iter::once(Series { drone: None, values: levels, dof: None }).chain(drones).collect()
+    let fleet = is_split.then_some(Series { drone: None, values: levels, dof: None });
+    fleet.into_iter().chain(drones).collect()
 }

@@ -5,9 +5,11 @@ use thiserror::Error;
 use super::chance::{LEVEL, chi2_above, f_above, holm};
 use super::fleet_laws::{FleetLaws, LawChoice};
 use super::laws::{self, Series};
+use super::maps::{self, Calibrations};
 use super::result::{AllEqual, COMPARE_SCHEMA, Comparison, LawComparison, Quantity};
 use super::side::{Couple, FlightOf, Side, couples};
-use super::{maps, structure};
+use super::structure;
+use crate::analysis::LawKind;
 use crate::base::estimate::Estimate;
 use crate::mission::plan::Purpose;
 use crate::numeric::median;
@@ -111,6 +113,7 @@ fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
         couples.iter().partition(calibration);
     let same_calibration =
         !calibrations.is_empty() && calibrations.iter().all(|couple| couple.is_one_flight());
+    let mut scatters = Vec::new();
     for couple in calibrations {
         let words = words_of(couple);
         if couple.is_one_flight() {
@@ -122,6 +125,9 @@ fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
         match laws_of(couple, choice) {
             Ok(laws) => {
                 note_drones(found, couple, &laws);
+                note_law(found, couple, choice);
+                let hover = laws.fleet.iter().find(|change| change.quantity == Quantity::Hover);
+                scatters.extend(hover.and_then(|change| change.scatter));
                 found.laws.push(laws);
             }
             Err(reason) => {
@@ -129,8 +135,9 @@ fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
             }
         }
     }
+    let scatter = scatters.into_iter().fold(1.0, f64::max);
     for couple in measurements {
-        measurement(found, couple, same_calibration);
+        measurement(found, couple, Calibrations { are_one: same_calibration, scatter });
     }
 }
 
@@ -167,7 +174,7 @@ fn laws_of(couple: &Couple<'_>, choice: LawChoice) -> Result<LawComparison, Stri
     laws::compare(couple, &a, &b).ok_or_else(|| "no drone has a law in both".to_owned())
 }
 
-fn measurement(found: &mut Comparison, couple: &Couple<'_>, same_calibration: bool) {
+fn measurement(found: &mut Comparison, couple: &Couple<'_>, calibrations: Calibrations) {
     let words = words_of(couple);
     let [a, b] = [couple.reference.flight, couple.other.flight];
     let (Some(of_a), Some(of_b)) = (&a.map, &b.map) else {
@@ -190,7 +197,7 @@ fn measurement(found: &mut Comparison, couple: &Couple<'_>, same_calibration: bo
             .notes
             .push(format!("The maps of {words} were inverted by different laws: {one}, {other}"));
     }
-    match maps::compare(couple, [of_a, of_b], same_calibration) {
+    match maps::compare(couple, [of_a, of_b], calibrations) {
         Some((map, reason)) => {
             found.maps.push(map);
             if let Some(reason) = reason {
@@ -230,6 +237,24 @@ fn note_alone(found: &mut Comparison, reference: &Side, other: &Side, couples: &
         found
             .not_compared
             .push(format!("{} {verb} no counterpart in the other campaign.", listed(&alone)));
+    }
+}
+
+/// Flights whose windows prefer another law than the one that was asked for.
+fn note_law(found: &mut Comparison, couple: &Couple<'_>, choice: LawChoice) {
+    let asked = match choice {
+        LawChoice::Preferred => return,
+        LawChoice::Linear => LawKind::Linear,
+        LawChoice::SignedQuadratic => LawKind::SignedQuadratic,
+    };
+    for flight in [couple.reference, couple.other] {
+        let headline = flight.flight.headline.as_ref();
+        if let Some(preferred) = headline.map(|headline| headline.law).filter(|law| *law != asked) {
+            found.notes.push(format!(
+                "The windows of {} prefer the {preferred} law: what the {asked} law says of single drones may be chance",
+                flight.id()
+            ));
+        }
     }
 }
 

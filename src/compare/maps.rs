@@ -29,17 +29,26 @@ const FEWEST_INDEPENDENT: f64 = 3.0;
 /// Places that the number of independent ones is found from.
 const MOST_PLACES: usize = 600;
 
-/// Compares the maps of two flights; `same_calibration`: they rest on one. Also tells why places were not compared.
+/// The calibrations that two maps rest on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Calibrations {
+    /// They are one, whose errors cancel.
+    pub(super) are_one: bool,
+    /// Scatter of the drones' laws over their stated errors, by which those are widened here, too; 1 or more.
+    pub(super) scatter: f64,
+}
+
+/// Compares the maps of two flights. Also tells why places were not compared.
 pub(super) fn compare(
     couple: &Couple<'_>,
     [a, b]: [&UpdraftMap; 2],
-    same_calibration: bool,
+    calibrations: Calibrations,
 ) -> Option<(MapComparison, Option<String>)> {
-    let mean = means(a, b, same_calibration)?;
+    let mean = means(a, b, calibrations)?;
     let fleet = |map: &UpdraftMap| map.posterior.as_ref().and_then(|posterior| posterior.fleet);
-    let posterior = fleet(a).zip(fleet(b)).filter(|_| !same_calibration);
+    let posterior = fleet(a).zip(fleet(b)).filter(|_| !calibrations.are_one);
     let flights = [couple.reference.flight, couple.other.flight];
-    let (places, reason) = match by_place(a, b, same_calibration, flights) {
+    let (places, reason) = match by_place(a, b, calibrations, flights) {
         Ok(places) => (Some(places), None),
         Err(reason) => (None, Some(reason)),
     };
@@ -47,7 +56,7 @@ pub(super) fn compare(
         pair: couple.pair(),
         mean,
         posterior: posterior.map(|(a, b)| of_normals(a, b)),
-        same_calibration,
+        same_calibration: calibrations.are_one,
         places,
         scales: scales(flights, [a, b]),
     };
@@ -71,13 +80,13 @@ fn of_normals(a: Estimate, b: Estimate) -> MeanComparison {
 }
 
 /// Variance of a drone's mean by errors of its own.
-fn own_variance(map: &UpdraftMap, drone: &DroneUpdraft, same_calibration: bool) -> f64 {
+fn own_variance(map: &UpdraftMap, drone: &DroneUpdraft, calibrations: Calibrations) -> f64 {
     let errors = &drone.errors;
-    let of_law = if same_calibration {
+    let of_law = if calibrations.are_one {
         0.0
     } else {
         let common = map.common.map_or(0.0, |common| common.law_mps);
-        (errors.law_mps.powi(2) - common * common).max(0.0)
+        (errors.law_mps.powi(2) - common * common).max(0.0) * calibrations.scatter.powi(2)
     };
     errors.window_mps.powi(2) + errors.velocity_mps.powi(2) + of_law
 }
@@ -95,11 +104,11 @@ struct FleetMean {
 }
 
 impl FleetMean {
-    fn of(map: &UpdraftMap, same_calibration: bool) -> Option<Self> {
+    fn of(map: &UpdraftMap, calibrations: Calibrations) -> Option<Self> {
         let drones = || map.drones.iter().filter(|drone| drone.mean.value.is_finite());
         let value = mean(drones().map(|drone| drone.mean.value))?;
         let n = drones().count() as f64;
-        let own = drones().map(|drone| own_variance(map, drone, same_calibration)).sum::<f64>();
+        let own = drones().map(|drone| own_variance(map, drone, calibrations)).sum::<f64>();
         let common = map.common.unwrap_or_default();
         let flight = common.battery_mps.hypot(common.wind_mps);
         let zero = common.zero_mps.hypot(common.law_mps);
@@ -121,14 +130,14 @@ impl FleetMean {
     }
 }
 
-fn means(a: &UpdraftMap, b: &UpdraftMap, same_calibration: bool) -> Option<MeanComparison> {
-    let (a, b) = (FleetMean::of(a, same_calibration)?, FleetMean::of(b, same_calibration)?);
+fn means(a: &UpdraftMap, b: &UpdraftMap, calibrations: Calibrations) -> Option<MeanComparison> {
+    let (a, b) = (FleetMean::of(a, calibrations)?, FleetMean::of(b, calibrations)?);
     let is_known = a.is_known && b.is_known;
     let interval = |value: f64, half: f64| is_known.then_some([value - half, value + half]);
     let rest = (a.own_variance + b.own_variance).sqrt().hypot(a.flight.hypot(b.flight));
     let rest = rest.hypot(a.density - b.density);
     let [zero, half] =
-        [0, 1].map(|of| if same_calibration { 0.0 } else { a.zero[of].hypot(b.zero[of]) });
+        [0, 1].map(|of| if calibrations.are_one { 0.0 } else { a.zero[of].hypot(b.zero[of]) });
     let change = Estimate::new(b.value - a.value, if is_known { zero.hypot(rest) } else { 0.0 });
     let half = half.hypot(NORMAL * rest);
     // The interval of a zero is wider than a normal one: its half width says what is beyond chance.
@@ -150,7 +159,7 @@ fn means(a: &UpdraftMap, b: &UpdraftMap, same_calibration: bool) -> Option<MeanC
 fn by_place(
     a: &UpdraftMap,
     b: &UpdraftMap,
-    same_calibration: bool,
+    calibrations: Calibrations,
     flights: [&FlightAnalysis; 2],
 ) -> Result<PlaceComparison, String> {
     if a.is_scan() || b.is_scan() {
@@ -177,7 +186,7 @@ fn by_place(
         let Some((at, other)) = found else { continue };
         taken[at] = true;
         let own = |map: &UpdraftMap, drone: &DroneUpdraft| {
-            Estimate::new(drone.mean.value, own_variance(map, drone, same_calibration).sqrt())
+            Estimate::new(drone.mean.value, own_variance(map, drone, calibrations).sqrt())
         };
         let (reference, other) = (own(a, drone), own(b, other));
         let change = Estimate::new(other.value - reference.value, reference.se.hypot(other.se));
@@ -405,7 +414,9 @@ mod tests {
         };
         // 25 independent places have 24 degrees of freedom beside their mean.
         assert!((independent(&grid(1e4), [100.0, 100.0]).unwrap() - 25.0).abs() < 0.1);
-        assert!(independent(&grid(7.0), [145.0, 145.0]).unwrap() < 6.0);
+        // NumPy: 1 + trace(PAP)**2 / trace(PAP @ PAP).
+        let near = independent(&grid(7.0), [145.0, 145.0]).unwrap();
+        assert!((near - 6.805269246629946).abs() < 1e-9, "{near}");
     }
 
     #[test]

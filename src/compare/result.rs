@@ -148,7 +148,7 @@ pub struct FleetChange {
     pub other: Estimate,
     /// Change of the drones in both, with both common errors, each counted once.
     pub change: Estimate,
-    /// The change over its error; absent: the error is not known.
+    /// The change over its error; absent: the error is not known, or without what the drones share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
     /// Probability of at least this change by chance.

@@ -15,7 +15,7 @@ pub struct Side {
     pub path: String,
     /// Analysis of the campaign.
     pub analysis: Analysis,
-    /// What is known of the flights besides, in their order.
+    /// Facts of the flights from the campaign's records, in their order; empty: there are none.
     pub facts: Vec<FlightFacts>,
 }
 

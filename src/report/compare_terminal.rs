@@ -118,10 +118,10 @@ impl Output {
         let shown = most_changed(law);
         let columns = [
             column("drone", Align::Left, 0),
-            column("hover before", Align::Right, 3),
-            column("now", Align::Right, 3),
+            column("hover before", Align::Right, 2),
+            column("now", Align::Right, 2),
             column("beyond fleet", Align::Right, 0),
-            column("p", Align::Right, 2),
+            column("p", Align::Right, 3),
             column("p of all", Align::Right, 0),
             column("response", Align::Right, 1),
             column("p of all", Align::Right, 1),
@@ -152,7 +152,12 @@ impl Output {
         self.table(&columns, &rows);
         if shown.len() < law.drones.len() {
             let left = law.drones.len() - shown.len();
-            self.line(DIM, &format!("  {left} more drones, which changed less, are in the report"));
+            let words = if left == 1 {
+                "drone, which changed less, is"
+            } else {
+                "drones, which changed less, are"
+            };
+            self.line(DIM, &format!("  {left} more {words} in the report"));
         }
     }
 
