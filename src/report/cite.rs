@@ -1,4 +1,4 @@
-//! What is needed to cite a measurement: what, where, when, how, with which program, from which files.
+//! The section to cite a measurement by: title, site, times, method, program, hashes of files.
 
 use std::fmt::Write as _;
 

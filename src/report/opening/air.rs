@@ -1,4 +1,4 @@
-//! What the air did, and how sure that is; of a calibration, what its laws say.
+//! The air of a flight and how sure it is, in sentences; of a calibration, its laws.
 
 use crate::analysis::LawKind;
 use crate::analysis::law::Symbol;

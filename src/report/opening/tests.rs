@@ -75,6 +75,11 @@ fn hover(more: &Value) -> Value {
                 },
             },
             "statistics": {
+                "record": {
+                    "drones": 2, "length_s": 100.0, "missing_share": 0.0, "running_mean_s": 10.0,
+                    "spacing_m": 14.0, "extent_m": 14.0, "sd_mps": 0.1, "common_sd_mps": 0.1,
+                },
+                "space": null, "time": null, "likelihood": null, "variants": [], "absent": [],
                 "wind": {
                     "speed_mps": { "value": 2.8261, "se": 0.0039 }, "from_deg": 271.0,
                     "lean_deg": 4.0, "drones": [], "words": "",
@@ -134,7 +139,7 @@ fn a_calibration_alone_tells_its_laws_and_what_they_do_not() {
         "linear": {
             "parameters": [parameter("A'", "us/(m/s)", 26.88, 2.6), parameter("u0", "us", 1540.2, 9.8)],
             "covariance": [], "points": 14, "chi2": 12.0, "chi2_reduced": 1.0, "p_value": 0.5,
-            "dof": 12, "rms_us": 1.0,
+            "dof": 12, "rms_us": 1.0, "other_minima": [], "warnings": [],
         },
     });
     let calibration = flight("calibration", &json!({ "drones": [drone], "simulated": true }));

@@ -1,4 +1,4 @@
-//! What to distrust most, in words, the worst first.
+//! The largest doubts about an analysis, in words, the worst first.
 
 use crate::analysis::Warning;
 use crate::analysis::WindHandled;

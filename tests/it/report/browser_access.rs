@@ -162,7 +162,7 @@ fn a_clicked_drone_is_not_under_the_bar() {
     );
     assert!(gap >= -1.0, "the drone begins {} px under the bar", -gap);
     let label = tab.text("document.querySelector('.gallery figcaption b').textContent");
-    assert!(label.starts_with("Figure 3-calibration-17-drone-17. "), "{label}");
+    assert!(label.starts_with("Figure 3-calibration-16-drone-17. "), "{label}");
     // With the slider in hand, too, Page keys step by ten.
     tab.run("document.querySelector('.film input[type=range]').focus()");
     tab.press(crate::report::chromium::Key::PageDown);
