@@ -358,6 +358,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         indicator: options.indicator,
         planned: input.plan.is_some(),
         orientation_deg: input.plan.map(|plan| plan.site.orientation_deg),
+        origin_deg: input.plan.map(|plan| [plan.site.origin_lat_deg, plan.site.origin_lon_deg]),
         true_updraft_mps: input.true_updraft_mps,
         logs: input.logs.len(),
         missing: account::missing(input, &drones, &unused),

@@ -180,6 +180,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
     FlightAnalysis {
         indicator: Indicator::Pulse,
         orientation_deg: None,
+        origin_deg: None,
         statistics: None,
         wind_legs: None,
         name: String::new(),

@@ -66,6 +66,9 @@ pub struct FlightAnalysis {
     /// plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_deg: Option<f64>,
+    /// Origin of the show frame: latitude and longitude, degrees; absent without a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin_deg: Option<[f64; 2]>,
     /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
     pub true_updraft_mps: Option<f64>,
     /// Analysed drones, in slot order.
@@ -261,6 +264,10 @@ pub struct Trace {
     pub velocity_mps: Vec<f64>,
     /// Tilt-corrected pulse width, us.
     pub pulse_phi_us: Vec<f64>,
+    /// How far north and east of its home the drone was, m, in whole centimetres; null where its log does not say,
+    /// empty where it never does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moved_m: Vec<Option<[f64; 2]>>,
 }
 
 /// Estimated vertical air speed of the fleet over time.

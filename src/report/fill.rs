@@ -8,7 +8,10 @@ use super::{Provenance, ReportError};
 
 /// Macros that the pages import under this name.
 const SHARED: (&str, &str) = ("shared.html", include_str!("../../templates/report/shared.html"));
-const STYLE: &str = include_str!("../../templates/report/style.css");
+/// Interactive parts of a flight.
+const EXPLORER: (&str, &str) =
+    ("explorer.html", include_str!("../../templates/report/explorer.html"));
+pub(super) const STYLE: &str = include_str!("../../templates/report/style.css");
 
 /// Lists that are longer than this start folded.
 pub(super) const OPEN_LIMIT: usize = 6;
@@ -18,6 +21,7 @@ pub(super) fn fill(name: &str, page: &str, values: Value) -> Result<String, Repo
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.add_template(SHARED.0, SHARED.1)?;
+    environment.add_template(EXPLORER.0, EXPLORER.1)?;
     environment.add_template(name, page)?;
     Ok(environment.get_template(name)?.render(values)?)
 }

@@ -10,11 +10,14 @@
 //! control characters are replaced.
 
 mod axis;
+mod basemap;
 mod chart;
 mod colour;
 mod compare;
+mod delta;
 mod drone_table;
 mod errors;
+mod explorer;
 pub mod fields;
 pub mod fields_grid;
 #[cfg(feature = "parquet")]
@@ -56,6 +59,8 @@ mod svg;
 mod table;
 mod terminal;
 mod text;
+mod tracks;
+mod vendor;
 
 use std::path::Path;
 
@@ -65,6 +70,7 @@ use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
 use crate::study::result::StudyResult;
 
+pub use basemap::{Basemap, BasemapError, Corners, MOST_BASEMAP_BYTES};
 pub use gap_page::render_gap;
 pub use gap_terminal::gap_summary;
 pub use sensitivity_page::render_sensitivity;
@@ -78,6 +84,8 @@ pub use terminal::terminal_summary;
 pub const PAGE_FILE: &str = "index.html";
 /// Folder of the figures in the report's folder.
 pub const FIGURES_FOLDER: &str = "figures";
+/// Folder of data in the report's folder, for fleets whose data do not fit into the page.
+pub const DATA_FOLDER: &str = "data";
 
 /// Origin of a report, printed in it: program, command, seed, settings, input files.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -113,6 +121,9 @@ pub struct Report {
     pub html: String,
     /// The figures: (name without `.svg`, content as SVG).
     pub figures: Vec<(String, String)>,
+    /// Files of data beside the page, which it loads when a drone of a large fleet is picked: (name without `.js`,
+    /// content).
+    pub data: Vec<(String, String)>,
 }
 
 /// Error of making or writing a report.
@@ -142,7 +153,28 @@ struct Figure {
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.
 pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
-    page::render(analysis, None, provenance)
+    page::render(analysis, Beside::default(), provenance)
+}
+
+/// What goes into a report beside the analysis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside<'a> {
+    /// A finished simulation study, for the paper's Fig. 2 and Table I.
+    pub study: Option<&'a StudyResult>,
+    /// A picture of the ground, below the maps.
+    pub basemap: Option<&'a Basemap>,
+}
+
+/// Renders the report with what is at hand beside the analysis.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_with(
+    analysis: &Analysis,
+    beside: Beside<'_>,
+    provenance: &Provenance,
+) -> Result<Report, ReportError> {
+    page::render(analysis, beside, provenance)
 }
 
 /// Renders the report with the paper's Fig. 2 and Table I from a finished simulation study.
@@ -154,10 +186,10 @@ pub fn render_with_study(
     study: &StudyResult,
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
-    page::render(analysis, Some(study), provenance)
+    page::render(analysis, Beside { study: Some(study), basemap: None }, provenance)
 }
 
-/// Writes `index.html` and `figures/*.svg` to `folder`; the page comes last, so that a folder with
+/// Writes `index.html`, `figures/*.svg` and `data/*.js` to `folder`; the page comes last, so that a folder with
 /// a page is complete.
 ///
 /// # Errors
@@ -167,6 +199,9 @@ pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     let figures = folder.join(FIGURES_FOLDER);
     for (name, svg) in &report.figures {
         write_whole(&figures.join(format!("{name}.svg")), svg.as_bytes())?;
+    }
+    for (name, script) in &report.data {
+        write_whole(&folder.join(DATA_FOLDER).join(format!("{name}.js")), script.as_bytes())?;
     }
     write_whole(&folder.join(PAGE_FILE), report.html.as_bytes())?;
     Ok(())

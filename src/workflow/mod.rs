@@ -32,6 +32,7 @@
 //! ```
 
 pub mod analyze;
+pub mod basemap;
 pub mod archive;
 pub mod blind;
 pub mod check;

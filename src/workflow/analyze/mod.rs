@@ -32,8 +32,7 @@ use crate::campaign;
 use crate::campaign::origin::LogOrigin;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
-use crate::report::{self, Provenance};
-use crate::study::result::StudyResult;
+use crate::report::{self, Basemap, Beside, Provenance};
 
 /// Analyses the simulated logs of a campaign, and writes numbers and report into its folder.
 ///
@@ -130,7 +129,14 @@ impl<'a> Analysing<'a> {
         analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
         host.check_stop()?;
         let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
-        Ok(Analysed { analysis, logs, provenance, root: work.root.clone(), some_absent })
+        Ok(Analysed {
+            analysis,
+            logs,
+            provenance,
+            root: work.root.clone(),
+            some_absent,
+            basemap: None,
+        })
     }
 }
 
@@ -213,9 +219,17 @@ pub struct Analysed {
     root: PathBuf,
     /// Flights that were found gave nothing at all.
     some_absent: bool,
+    /// Picture of the ground below the report's maps.
+    basemap: Option<Basemap>,
 }
 
 impl Analysed {
+    /// Puts a picture of the ground below the report's maps.
+    #[must_use]
+    pub fn on(self, basemap: Option<Basemap>) -> Self {
+        Self { basemap, ..self }
+    }
+
     /// Writes numbers and report into a folder. Returns the path of the page; `None` if the page
     /// says that nothing was found.
     ///
@@ -228,7 +242,11 @@ impl Analysed {
         let study = read_study(host, &self.root);
         let report_folder = folder.join("report");
         let (page_made, numbers_made) = rayon::join(
-            || write_report(&self.analysis, study.as_ref(), provenance, &report_folder),
+            || {
+                let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
+                let made = report::render_with(&self.analysis, beside, provenance)?;
+                Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
+            },
             || write_numbers(&self.analysis, folder),
         );
         page_made.and(numbers_made)?;
@@ -271,20 +289,6 @@ impl Analysed {
             Yield::Whole | Yield::Partial => Ok(Ending::Losses),
         }
     }
-}
-
-/// The page with its figures.
-fn write_report(
-    analysis: &Analysis,
-    study: Option<&StudyResult>,
-    provenance: &Provenance,
-    folder: &Path,
-) -> Result<(), WorkflowError> {
-    let made = match study {
-        Some(study) => report::render_with_study(analysis, study, provenance)?,
-        None => report::render(analysis, provenance)?,
-    };
-    Ok(report::write(&made, folder)?)
 }
 
 /// All numbers, and the field of the map as tables.

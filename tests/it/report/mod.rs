@@ -2,6 +2,7 @@
 
 mod browser;
 pub(crate) mod chromium;
+mod explorer;
 mod fields;
 mod gap;
 mod page;
