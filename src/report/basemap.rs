@@ -40,13 +40,19 @@ pub enum BasemapError {
     Corners(String),
     /// No drone stands in the picture.
     #[error(
-        "does not show the grid: its nearest edge is {away_m:.0} m from the nearest drone. Check the corners: latitude \
-         first, then longitude"
+        "does not show the grid: its nearest edge is {} from the nearest drone. Check the corners: latitude first, then \
+         longitude",
+        far(*away_m)
     )]
     Elsewhere {
         /// Distance to the nearest drone, m.
         away_m: f64,
     },
+}
+
+/// A distance of metres or kilometres.
+fn far(away_m: f64) -> String {
+    if away_m < 10_000.0 { format!("{away_m:.0} m") } else { format!("{:.0} km", away_m / 1000.0) }
 }
 
 /// The south-west and the north-east corner of a picture whose upper edge is north: latitude and longitude,

@@ -1,4 +1,4 @@
-//! What the page's interactive parts show of a flight: every drone over time, and the replay of its tracks.
+//! Data of the page's interactive parts: every drone of a flight over time, and the replay of its tracks.
 //!
 //! The page itself holds what fits: of small fleets everything, of large ones every few seconds. Then files beside
 //! the page hold the rest, some drones each, which the page loads when one of them is picked.
@@ -186,6 +186,7 @@ pub(super) fn explorer(
         tracks => data.tracks.is_some(),
         posterior => map.is_some_and(|map| map.posterior.is_some()),
         banded,
+        truth => film && frames.is_some_and(|frames| frames.truth_known),
         placed,
         north => flight.orientation_deg.is_some(),
         turn => flight.orientation_deg.filter(|deg| usable(*deg)).unwrap_or(0.0),

@@ -156,7 +156,7 @@ pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, Re
     page::render(analysis, Beside::default(), provenance)
 }
 
-/// What goes into a report beside the analysis.
+/// Parts of a report beside the analysis.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
     /// A finished simulation study, for the paper's Fig. 2 and Table I.

@@ -56,7 +56,7 @@ pub(super) fn render(
     let title = clean(&analysis.title);
     let values = context! {
         title => if title.trim().is_empty() { "Updraft report".to_owned() } else { title },
-        script => Value::from_safe_string(format!("{}\n{}", plotter(), SCRIPTS.concat())),
+        script => Value::from_safe_string(format!("\"use strict\";\n{}\n{}", plotter(), SCRIPTS.concat())),
         style => Value::from_safe_string(format!("{STYLE}{EXPLORER_STYLE}{}", plotter_style())),
         made_by => clean(&analysis.made_by),
         schema => clean(&analysis.schema),

@@ -44,7 +44,7 @@ for (const replay of document.querySelectorAll(".replay")) {
       const power = 10 ** Math.floor(Math.log10(raw));
       return [1, 2, 5, 10].map((f) => f * power).find((f) => f >= raw);
     };
-    const cell = nice(widest / 8);
+    const cell = nice(Math.max(widest / 8, reach[2][1] / 30));
     const ground = [0, 1].map((axis) => [Math.floor(reach[axis][0] / cell - 0.5) * cell, Math.ceil(reach[axis][1] / cell + 0.5) * cell]);
     const top = Math.max(reach[2][1], cell);
     const centre = [(ground[0][0] + ground[0][1]) / 2, (ground[1][0] + ground[1][1]) / 2, top / 2];
@@ -218,7 +218,9 @@ for (const replay of document.querySelectorAll(".replay")) {
       if (chosen) {
         pen.fillStyle = ink.ink;
         pen.textAlign = "left";
-        pen.fillText(flight.names[picked], chosen.at[0] + size + 8, chosen.at[1] + 4);
+        pen.lineWidth = 3;
+        pen.strokeStyle = ink.paper;
+        for (const way of ["strokeText", "fillText"]) pen[way](flight.names[picked], chosen.at[0] + size + 8, chosen.at[1] + 4);
       }
     };
     // For whoever wants to know what is where.

@@ -261,8 +261,12 @@ for (const chart of document.querySelectorAll(".series")) {
       }
       reading.textContent = `${Math.round(time).toString().replace("-", "−")} s: ${words}${fleet}`;
     };
+    let at = [];
     const point = (u) => {
-      hovered = closest(u);
+      const { left, top } = u.cursor;
+      // What is drawn anew below a pointer that rests is not pointed at.
+      if (left !== at[0] || top !== at[1]) hovered = closest(u);
+      at = [left, top];
       chart.dataset.hovered = hovered < 0 ? "" : flight.names[hovered];
       dot.hidden = hovered < 0;
       if (hovered >= 0) {
@@ -270,6 +274,12 @@ for (const chart of document.querySelectorAll(".series")) {
         dot.style.transform = `translate(${u.valToPos(shown.times[idx], "x")}px, ${u.valToPos(shown.rows[hovered][idx], "y")}px)`;
       }
       read();
+    };
+
+    const unpoint = () => {
+      hovered = -1;
+      dot.hidden = true;
+      chart.dataset.hovered = "";
     };
 
     const ends = () => [shown.times[0], shown.times[shown.times.length - 1]];
@@ -369,6 +379,7 @@ for (const chart of document.querySelectorAll(".series")) {
     });
     const pickChanged = () => {
       const i = picked();
+      if (i !== hovered) unpoint();
       chart.dataset.picked = i < 0 ? "" : flight.names[i];
       view(plot.scales.x.min, plot.scales.x.max);
       read();
@@ -377,6 +388,7 @@ for (const chart of document.querySelectorAll(".series")) {
     document.addEventListener("updraft:pick", pickChanged);
     document.addEventListener("updraft:time", ({ detail }) => {
       if (detail.flight !== key || detail.from === chart) return;
+      unpoint();
       now = detail.seconds;
       settle();
       read();

@@ -13,6 +13,6 @@ for (const packed of document.querySelectorAll(".gallery script.packed")) {
     gallery.dataset.unpacked = "yes";
     packed.remove();
     // A drone may have been picked before.
-    if (updraft.picked) updraft.pick(updraft.picked, null);
+    if (updraft.picked) gallery.querySelector("select").dispatchEvent(new Event("change"));
   });
 }

@@ -46,7 +46,7 @@ pub(super) fn ground(
         "<svg class=\"ground\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" \
          viewBox=\"{x:.1} {y:.1} {w:.1} {h:.1}\"><image class=\"basemap\" width=\"1\" height=\"1\" \
          preserveAspectRatio=\"none\" transform=\"matrix({:.4} {:.4} {:.4} {:.4} {:.2} {:.2})\" \
-         data-corners=\"[{told}]\" href=\"{}\"/></svg><style>svg.ground ~ g > rect {{ fill-opacity: \
+         data-corners=\"[{told}]\" href=\"{}\"/></svg><style>svg.ground ~ g[data-pick] > rect {{ fill-opacity: \
          var(--cells, {CELLS}) }}</style>",
         ne[0] - nw[0],
         ne[1] - nw[1],

@@ -14,7 +14,8 @@ fn refused(content: &[u8], more: &[&str]) -> String {
     let bench = Bench::new();
     fs::write(bench.path("field.png"), content).unwrap();
     let args =
-        [&["run", "--grid", "1x2", "--basemap", "field.png", "-o", "flown"], SHORT, more].concat();
+        [&["run", "--grid", "1x2", "--basemap", "field.png", "-o", "flown"][..], SHORT, more]
+            .concat();
     let ended = bench.expect(2, &args);
     assert!(!bench.path("flown").exists(), "nothing is flown\n{ended}");
     ended.err
@@ -58,6 +59,7 @@ fn a_file_of_corners_with_a_mistake() {
     let bench = Bench::new();
     fs::write(bench.path("field.png"), PNG).unwrap();
     fs::write(bench.path("field.png.json"), "{\"south_west\": [47.472, 19.060]}").unwrap();
-    let args = [&["run", "--grid", "1x2", "--basemap", "field.png", "-o", "flown"], SHORT].concat();
+    let args =
+        [&["run", "--grid", "1x2", "--basemap", "field.png", "-o", "flown"][..], SHORT].concat();
     assert_snapshot!(bench.expect(2, &args).err);
 }
