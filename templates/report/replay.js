@@ -48,7 +48,7 @@ for (const replay of document.querySelectorAll(".replay")) {
     const ground = [0, 1].map((axis) => [Math.floor(reach[axis][0] / cell - 0.5) * cell, Math.ceil(reach[axis][1] / cell + 0.5) * cell]);
     const top = Math.max(reach[2][1], cell);
     const centre = [(ground[0][0] + ground[0][1]) / 2, (ground[1][0] + ground[1][1]) / 2, top / 2];
-    const radius = Math.hypot(ground[0][1] - centre[0], ground[1][1] - centre[1], top / 2);
+    const around = Math.hypot(ground[0][1] - centre[0], ground[1][1] - centre[1]);
     replay.querySelector(".cell").textContent = `${cell} m`;
 
     // A picture of the ground, if the map has one.
@@ -64,8 +64,9 @@ for (const replay of document.querySelectorAll(".replay")) {
     let view = null;
     const look = () => {
       const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-      const scale = (zoom * 0.45 * Math.min(width, height)) / radius;
       const [sin, cos, sinTilt, cosTilt] = [Math.sin(turn), Math.cos(turn), Math.sin(tilt), Math.cos(tilt)];
+      // All of it fits, however it is turned.
+      const scale = zoom * 0.45 * Math.min(width / around, height / (around * sinTilt + (top / 2) * cosTilt));
       view = {
         width,
         height,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::report::chromium::{Browser, Key, Tab};
-use crate::report::synthetic::{crowd, posterior, provenance, traced, whole_campaign};
+use crate::report::synthetic::{crowd, provenance, traced, whole_campaign};
 use updraft::analysis::result::Analysis;
 use updraft::report::{Basemap, Beside, Corners, render, render_with, write};
 
@@ -223,7 +223,7 @@ fn the_keyboard_alone_works() {
 #[test]
 fn the_replay_has_the_colours_of_the_values() {
     let Some(mut browser) = Browser::start() else { return };
-    let analysis = traced(posterior(whole_campaign()));
+    let analysis = traced(whole_campaign());
     let (address, folder) = report("colours", &analysis);
     let mut tab = browser.open(&address, [1280, 900]);
     both_begun(&mut tab);
@@ -233,7 +233,7 @@ fn the_replay_has_the_colours_of_the_values() {
     let time = map.time_s.iter().position(|time| *time == 400.0).unwrap();
     let mut seen = 0;
     for drone in &map.drones {
-        let Some(value) = drone.posterior_mps[time] else { continue };
+        let Some(value) = drone.updraft_mps[time] else { continue };
         // The pixel in the middle of its marker, and the colour that the scale has for the value.
         let found: Value = serde_json::from_str(&tab.text(&format!(
             "(() => {{ const replay = document.querySelector('{HOVER} .replay'); \
