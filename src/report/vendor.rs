@@ -32,7 +32,7 @@ mod tests {
     #[test]
     fn the_library_is_as_it_was_published() {
         for (content, expected) in PUBLISHED {
-            assert_eq!(sha256(content.as_bytes()), expected, "{:.60}", content);
+            assert_eq!(sha256(content.as_bytes()), expected, "{content:.60}");
         }
     }
 

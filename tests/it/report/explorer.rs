@@ -254,7 +254,7 @@ fn the_replay_has_the_colours_of_the_values() {
         }
         let colours = found["colours"].as_array().unwrap();
         let place = (value / found["limit"].as_f64().unwrap()).clamp(-1.0, 1.0);
-        let step = ((place + 1.0) / 2.0 * (colours.len() - 1) as f64).round() as usize;
+        let step = (f64::midpoint(place, 1.0) * (colours.len() - 1) as f64).round() as usize;
         let hex = colours[step].as_str().unwrap();
         for part in 0..3 {
             let expected = i64::from_str_radix(&hex[1 + 2 * part..3 + 2 * part], 16).unwrap();
