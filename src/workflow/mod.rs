@@ -32,8 +32,8 @@
 //! ```
 
 pub mod analyze;
-pub mod basemap;
 pub mod archive;
+pub mod basemap;
 pub mod blind;
 pub mod check;
 pub mod clock;
