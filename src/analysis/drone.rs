@@ -22,7 +22,7 @@ use super::warning::Warning;
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::base::plain::{Shown as _, plain};
-use crate::flight::{Alignment, Flight, FlightOptions, Loss, table};
+use crate::flight::{Alignment, Flight, FlightOptions, Loss, Series, table};
 use crate::mission::plan::{Purpose, Segment, SegmentKind, Slot};
 
 /// What all logs of a flight share.
@@ -257,6 +257,8 @@ fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
     let Some((start, end)) = flight.velocity_up_mps.span() else { return Trace::default() };
     let step = ((end - start) / points.max(1) as f64).max(0.1);
     let mut trace = Trace::default();
+    let home = |series: &Series| series.value.first().copied();
+    let home = home(&flight.north_m).zip(home(&flight.east_m));
     for index in 0..points {
         let (from, to) = (start + index as f64 * step, start + (index + 1) as f64 * step);
         let mean = |values: &[f64]| (!values.is_empty()).then(|| mean_sd(values).0);
@@ -271,6 +273,14 @@ fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
         trace.height_m.push(height);
         trace.velocity_mps.push(velocity);
         trace.pulse_phi_us.push(pulse);
+        let moved = |series: &Series| mean(series.between(from, to));
+        let place = moved(&flight.north_m).zip(moved(&flight.east_m)).zip(home);
+        trace.moved_m.push(place.map(|((north, east), home)| {
+            [north - home.0, east - home.1].map(|m| (m * 100.0).round() / 100.0)
+        }));
+    }
+    if trace.moved_m.iter().all(Option::is_none) {
+        trace.moved_m.clear();
     }
     trace
 }

@@ -268,6 +268,10 @@ pub struct Trace {
     pub velocity_mps: Vec<f64>,
     /// Tilt-corrected pulse width, us.
     pub pulse_phi_us: Vec<f64>,
+    /// How far north and east of its home the drone was, m, in whole centimetres; null where its log does not say,
+    /// empty where it never does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moved_m: Vec<Option<[f64; 2]>>,
 }
 
 /// Estimated vertical air speed of the fleet over time.

@@ -22,6 +22,11 @@ pub struct FlightSite {
 }
 
 impl FlightSite {
+    /// Origin of the show frame: latitude and longitude, degrees; `None` where it is not the plan's.
+    pub fn origin_deg(&self) -> Option<[f64; 2]> {
+        self.planned.then_some([self.lat_deg, self.lon_deg])
+    }
+
     /// The origin of a plan.
     pub(super) fn of_plan(plan: &Plan) -> Self {
         let site = plan.site;

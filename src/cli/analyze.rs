@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::analyze_each;
+use super::basemap_args::BasemapArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::origin::OriginChoice;
@@ -19,11 +20,12 @@ use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
 use crate::base::plain::Shown as _;
 use crate::base::shard::Share;
 use crate::flight::Indicator;
-use crate::report::{NO_EDGE, terminal_summary};
+use crate::report::{Basemap, NO_EDGE, terminal_summary};
 use crate::workflow::analyze::each::record_path;
 use crate::workflow::analyze::{
     Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
 };
+use crate::workflow::basemap::shows_work;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{LevelWish, Work};
@@ -82,8 +84,10 @@ pub(super) struct AnalyzeArgs {
     #[arg(long)]
     no_report: bool,
     /// Analyse each campaign by itself, into its own folder; those that are done are not done again
-    #[arg(long, conflicts_with_all = ["csv", "output", "no_report"])]
+    #[arg(long, conflicts_with_all = ["csv", "output", "no_report", "basemap"])]
     each: bool,
+    #[command(flatten)]
+    basemap: BasemapArgs,
     #[command(flatten)]
     sharing: ShardArgs,
     #[command(flatten)]
@@ -304,13 +308,17 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
     if let Some(indicator) = indicator {
         options.indicator = indicator.into();
     }
+    let basemap = args.basemap.read()?;
+    if let Some((path, basemap)) = args.basemap.basemap.as_ref().zip(basemap.as_ref()) {
+        shows_work(path, basemap, &work)?;
+    }
     let output = match &args.output {
         _ if args.no_report => None,
         Some(folder) => Some(folder.clone()),
         None => Some(request.output()?),
     };
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
-    finish(context, &work, &options, args.hold.as_deref(), output.as_deref())
+    finish(context, &work, &options, args.hold.as_deref(), (output.as_deref(), basemap))
 }
 
 /// Analyses a campaign into its own folder; the last step of `updraft run`.
@@ -318,9 +326,10 @@ pub(super) fn analyze_campaign(
     context: &Context,
     root: &Path,
     options: &AnalyzeOptions,
+    basemap: Option<Basemap>,
 ) -> Result<Exit, CommandError> {
     // What was just flown here.
-    finish(context, &simulated(root)?, options, None, Some(root))
+    finish(context, &simulated(root)?, options, None, (Some(root), basemap))
 }
 
 /// Analyses, and prints what came of it.
@@ -329,7 +338,7 @@ fn finish(
     work: &Work,
     options: &AnalyzeOptions,
     hold: Option<&Path>,
-    output: Option<&Path>,
+    (output, basemap): (Option<&Path>, Option<Basemap>),
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
     let settings = options.settings();
@@ -338,7 +347,7 @@ fn finish(
     if let Some(doubts) = analysing.doubts().filter(|_| context.json && !context.quiet) {
         context.warn(doubts);
     }
-    let analysed = analysing.run(output.is_some())?;
+    let analysed = analysing.run(output.is_some())?.on(basemap);
     let Analysed { analysis, logs, .. } = &analysed;
     if !context.json {
         let width = if context.width.is_some() { WIDTH } else { NO_EDGE };

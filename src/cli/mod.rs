@@ -3,6 +3,7 @@
 mod analyze;
 mod analyze_each;
 mod archive;
+mod basemap_args;
 mod blind;
 mod check;
 mod cluster;

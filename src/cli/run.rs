@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::analyze::{AnalyzeOptions, analyze_campaign};
+use super::basemap_args::BasemapArgs;
 use super::check::few;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
 use super::simulate::{AirArgs, AirSpecs, air_help, air_specs, speed, updraft};
+use crate::workflow::basemap::shows_a_plan;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::ending::Ending;
 use crate::workflow::run::{Airs, Run, fly_campaign};
@@ -75,6 +77,8 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     estimate: EstimateArgs,
     #[command(flatten)]
+    basemap: BasemapArgs,
+    #[command(flatten)]
     hide: HideArgs,
     #[command(flatten)]
     air: AirArgs,
@@ -96,12 +100,16 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     }
     let watch = Stopwatch::start(context);
     let run = args.campaign()?;
+    let basemap = args.basemap.read()?;
+    if let Some((path, basemap)) = args.basemap.basemap.as_ref().zip(basemap.as_ref()) {
+        shows_a_plan(path, basemap, run.mission.flights.iter().map(|flight| &flight.plan))?;
+    }
     let flown = fly_campaign(context, &run, few(context, false))?;
     if flown.ending == Ending::NoGo {
         return Ok(Exit::Unsafe);
     }
-    let exit =
-        analyze_campaign(context, &args.output, &AnalyzeOptions::of_run(args.estimate.plain))?;
+    let options = AnalyzeOptions::of_run(args.estimate.plain);
+    let exit = analyze_campaign(context, &args.output, &options, basemap)?;
     context.say(&format!("Done in {watch}"));
     Ok(if flown.ending == Ending::Losses { Exit::Losses } else { exit })
 }

@@ -9,11 +9,14 @@ use super::{Provenance, ReportError, links};
 /// Macros that the pages import under this name.
 const SHARED: (&str, &str) = ("shared.html", include_str!("../../templates/report/shared.html"));
 const CITE: (&str, &str) = ("cite.html", include_str!("../../templates/report/cite.html"));
-const STYLE: &str = concat!(
+pub(super) const STYLE: &str = concat!(
     include_str!("../../templates/report/style.css"),
     include_str!("../../templates/report/dark.css"),
     include_str!("../../templates/report/print.css"),
 );
+/// Interactive parts of a flight.
+const EXPLORER: (&str, &str) =
+    ("explorer.html", include_str!("../../templates/report/explorer.html"));
 
 /// Lists that are longer than this start folded.
 pub(super) const OPEN_LIMIT: usize = 6;
@@ -24,6 +27,7 @@ pub(super) fn fill(name: &str, page: &str, values: Value) -> Result<String, Repo
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.add_template(SHARED.0, SHARED.1)?;
     environment.add_template(CITE.0, CITE.1)?;
+    environment.add_template(EXPLORER.0, EXPLORER.1)?;
     environment.add_template(name, page)?;
     Ok(environment.get_template(name)?.render(values)?)
 }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::analysis::result::UpdraftMap;
 
 use super::colour::diverging;
+use super::explorer::pick;
 use super::frames::Frames;
 use super::posterior_grid::GridField;
 use super::text::shortened;
@@ -21,7 +22,7 @@ const MOST_TIMES: usize = 3_600;
 /// Stands for no value.
 const NONE: i16 = i16::MIN;
 /// Steps of the colour scale.
-const COLOURS: u32 = 40;
+pub(super) const COLOURS: u32 = 40;
 
 /// What the script reads.
 #[derive(Serialize)]
@@ -29,6 +30,8 @@ struct Data {
     /// Show time of each frame, s.
     times: Vec<f64>,
     names: Vec<String>,
+    /// By which the drones are picked, all over the page.
+    picks: Vec<String>,
     /// [forward, left], m.
     places: Vec<Option<[f64; 2]>>,
     /// Corners of the triangles, three by three.
@@ -87,9 +90,7 @@ pub(super) fn film(
     field: Option<&GridField<'_>>,
 ) -> Option<Film> {
     let drones = map.drones.len();
-    let most = (MOST_VALUES / drones.max(1)).clamp(2, MOST_TIMES);
-    let stride = frames.times.len().div_ceil(most).max(1);
-    let chosen: Vec<usize> = frames.times.iter().copied().step_by(stride).collect();
+    let chosen = thinned(&frames.times, drones);
     if chosen.len() < 2 {
         return None;
     }
@@ -101,6 +102,7 @@ pub(super) fn film(
     let data = Data {
         times: chosen.iter().map(|&time| round(frames.seconds(time), 0.5)).collect(),
         names: map.drones.iter().map(|drone| shortened(&drone.name, 32)).collect(),
+        picks: map.drones.iter().map(|drone| pick(drone.slot, &drone.name)).collect(),
         places: frames.places.iter().map(|place| place.map(|p| p.map(centimetres))).collect(),
         triangles: frames.surface.triangles().iter().flatten().copied().collect(),
         limit: frames.limit_mps,
@@ -124,6 +126,13 @@ pub(super) fn film(
     // `<` could end the script that holds the data.
     let json = serde_json::to_string(&data).ok()?.replace('<', "\\u003c");
     Some(Film { json, step_s, frames: chosen.len(), posterior })
+}
+
+/// Every few of these times, so that the values of so many drones fit into the page.
+pub(super) fn thinned(times: &[usize], drones: usize) -> Vec<usize> {
+    let most = (MOST_VALUES / drones.max(1)).clamp(2, MOST_TIMES);
+    let stride = times.len().div_ceil(most).max(1);
+    times.iter().copied().step_by(stride).collect()
 }
 
 /// The grid, thinned in time as the frames are.

@@ -123,7 +123,7 @@ fn true_air(map: &UpdraftMap, drone: usize, time: usize) -> Option<f64> {
 }
 
 /// A round number around nearly all of these sizes.
-fn scale_end(mut sizes: Vec<f64>) -> f64 {
+pub(super) fn scale_end(mut sizes: Vec<f64>) -> f64 {
     sizes.sort_by(f64::total_cmp);
     let place = (SHARE_ON_SCALE * sizes.len() as f64).ceil() as usize;
     let largest = sizes.get(place.saturating_sub(1)).copied().unwrap_or(0.0).max(LEAST_MPS);

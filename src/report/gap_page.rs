@@ -82,7 +82,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         ..common(provenance),
     };
     let html = fill("gap.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files })
+    Ok(Report { html, figures: figures.files, data: Vec::new() })
 }
 
 /// What is said, as sentences of a page.

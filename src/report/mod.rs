@@ -10,6 +10,7 @@
 //! control characters are replaced.
 
 mod axis;
+mod basemap;
 mod chart;
 mod cite;
 mod colour;
@@ -17,8 +18,10 @@ mod compare;
 mod compare_page;
 mod compare_terminal;
 mod compare_words;
+mod delta;
 mod drone_table;
 mod errors;
+mod explorer;
 pub mod fields;
 pub mod fields_grid;
 #[cfg(feature = "parquet")]
@@ -63,6 +66,8 @@ mod svg;
 mod table;
 mod terminal;
 mod text;
+mod tracks;
+mod vendor;
 
 use std::path::Path;
 
@@ -72,6 +77,7 @@ use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
 use crate::study::result::StudyResult;
 
+pub use basemap::{Basemap, BasemapError, Corners, MOST_BASEMAP_BYTES};
 pub use compare_page::render_comparison;
 pub use compare_terminal::comparison_summary;
 pub use gap_page::render_gap;
@@ -89,6 +95,8 @@ pub use text::NO_EDGE;
 pub const PAGE_FILE: &str = "index.html";
 /// Folder of the figures in the report's folder.
 pub const FIGURES_FOLDER: &str = "figures";
+/// Folder of data in the report's folder, for fleets whose data do not fit into the page.
+pub const DATA_FOLDER: &str = "data";
 
 /// Origin of a report, printed in it: program, command, seed, settings, input files.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -128,6 +136,9 @@ pub struct Report {
     pub html: String,
     /// The figures: (name without `.svg`, content as SVG).
     pub figures: Vec<(String, String)>,
+    /// Files of data beside the page, which it loads when a drone of a large fleet is picked: (name without `.js`,
+    /// content).
+    pub data: Vec<(String, String)>,
 }
 
 /// Error of making or writing a report.
@@ -157,7 +168,28 @@ struct Figure {
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.
 pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
-    page::render(analysis, None, provenance)
+    page::render(analysis, Beside::default(), provenance)
+}
+
+/// Parts of a report beside the analysis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside<'a> {
+    /// A finished simulation study, for the paper's Fig. 2 and Table I.
+    pub study: Option<&'a StudyResult>,
+    /// A picture of the ground, below the maps.
+    pub basemap: Option<&'a Basemap>,
+}
+
+/// Renders the report with what is at hand beside the analysis.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_with(
+    analysis: &Analysis,
+    beside: Beside<'_>,
+    provenance: &Provenance,
+) -> Result<Report, ReportError> {
+    page::render(analysis, beside, provenance)
 }
 
 /// Renders the report with the paper's Fig. 2 and Table I from a finished simulation study.
@@ -169,10 +201,10 @@ pub fn render_with_study(
     study: &StudyResult,
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
-    page::render(analysis, Some(study), provenance)
+    page::render(analysis, Beside { study: Some(study), basemap: None }, provenance)
 }
 
-/// Writes `index.html` and `figures/*.svg` to `folder`; the page comes last, so that a folder with
+/// Writes `index.html`, `figures/*.svg` and `data/*.js` to `folder`; the page comes last, so that a folder with
 /// a page is complete.
 ///
 /// # Errors
@@ -182,6 +214,9 @@ pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     let figures = folder.join(FIGURES_FOLDER);
     for (name, svg) in &report.figures {
         write_whole(&figures.join(format!("{name}.svg")), svg.as_bytes())?;
+    }
+    for (name, script) in &report.data {
+        write_whole(&folder.join(DATA_FOLDER).join(format!("{name}.js")), script.as_bytes())?;
     }
     write_whole(&folder.join(PAGE_FILE), report.html.as_bytes())?;
     Ok(())

@@ -7,33 +7,43 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::study::result::StudyResult;
 
 use super::cite::citation;
+use super::explorer::Explorer;
 use super::figures::{laws as figure_laws, study as figure_study};
-use super::fill::{OPEN_LIMIT, common, fill};
+use super::fill::{OPEN_LIMIT, STYLE, common, fill};
 use super::opening::Opening;
 use super::page_air::air_section;
 use super::page_flight::flight_section;
 use super::study_page::law_table;
 use super::text::{clean, slug};
-use super::{FIGURES_FOLDER, Figure, Provenance, Report, ReportError, glance};
+use super::vendor::{plotter, plotter_style};
+use super::{Beside, FIGURES_FOLDER, Figure, Provenance, Report, ReportError, glance};
 
 const PAGE: &str = include_str!("../../templates/report/report.html");
-const SCRIPTS: [&str; 2] = [
+/// The plotting library comes before them.
+const SCRIPTS: [&str; 7] = [
+    include_str!("../../templates/report/unpack.js"),
+    include_str!("../../templates/report/shared.js"),
     include_str!("../../templates/report/script.js"),
     include_str!("../../templates/report/film.js"),
+    include_str!("../../templates/report/series.js"),
+    include_str!("../../templates/report/replay.js"),
+    include_str!("../../templates/report/map.js"),
 ];
+const EXPLORER_STYLE: &str = include_str!("../../templates/report/explorer.css");
 
 /// Makes the page and the figures.
 pub(super) fn render(
     analysis: &Analysis,
-    study: Option<&StudyResult>,
+    beside: Beside<'_>,
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
+    let Beside { study, basemap } = beside;
     let mut figures = Gallery::default();
     let air: Vec<Value> = analysis
         .flights
         .iter()
         .enumerate()
-        .filter_map(|(index, flight)| air_section(analysis, flight, index, &mut figures))
+        .filter_map(|(index, flight)| air_section(analysis, flight, index, basemap, &mut figures))
         .collect();
     let laws = figure_laws::figure(analysis).map(|figure| figures.show(figure));
     let study = study.map(|study| study_section(study, &mut figures));
@@ -50,7 +60,8 @@ pub(super) fn render(
         opening => Opening::of(analysis).value(),
         cite => citation(analysis, &title, provenance),
         title,
-        script => Value::from_safe_string(SCRIPTS.concat()),
+        script => Value::from_safe_string(format!("\"use strict\";\n{}\n{}", plotter(), SCRIPTS.concat())),
+        style => Value::from_safe_string(format!("{STYLE}{EXPLORER_STYLE}{}", plotter_style())),
         made_by => clean(&analysis.made_by),
         schema => clean(&analysis.schema),
         seed => provenance.seed.map(|seed| seed.to_string()),
@@ -65,16 +76,25 @@ pub(super) fn render(
         ..common(provenance),
     };
     let html = fill("report.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files })
+    Ok(Report { html, figures: figures.files, data: figures.data })
 }
 
 /// Names the figures of the page as their files are named, and collects the files.
 #[derive(Default)]
 pub(super) struct Gallery {
     pub(super) files: Vec<(String, String)>,
+    /// Files of data beside the page.
+    data: Vec<(String, String)>,
 }
 
 impl Gallery {
+    /// Keeps the files of interactive parts; what their template gets.
+    pub(super) fn explore(&mut self, explorer: Option<Explorer>) -> Option<Value> {
+        let Explorer { values, files } = explorer?;
+        self.data.extend(files);
+        Some(values)
+    }
+
     /// Shows a figure with links to others, which lie in a folder as seen from the page.
     pub(super) fn show_linked(&mut self, figure: Figure) -> Value {
         let file = (figure.name.clone(), figure.svg.clone());

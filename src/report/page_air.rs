@@ -6,7 +6,9 @@ use minijinja::value::Value;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::axis::decimals_of;
+use super::basemap::Basemap;
 use super::colour::diverging;
+use super::explorer::explorer;
 use super::figures::map::Means;
 use super::figures::{
     air, averaging, correlation, evolution, levelled, map as figure_map, posterior, track,
@@ -27,17 +29,18 @@ pub(super) fn air_section(
     analysis: &Analysis,
     flight: &FlightAnalysis,
     index: usize,
+    basemap: Option<&Basemap>,
     figures: &mut Gallery,
 ) -> Option<Value> {
     let map = flight.map.as_ref()?;
     let key = flight_key(analysis, index);
     let frames = Frames::of(map);
     let field = GridField::of(map);
-    let alone = figure_map::mean_map(analysis, flight, &key, map, Means::Alone);
-    let together = map
-        .posterior
-        .as_ref()
-        .and_then(|_| figure_map::mean_map(analysis, flight, &key, map, Means::Posterior));
+    let drawn =
+        |means, basemap| figure_map::mean_map(analysis, (flight, &key), map, means, basemap);
+    let together = map.posterior.as_ref().and_then(|_| drawn(Means::Posterior, basemap));
+    // One picture is enough for a page.
+    let alone = drawn(Means::Alone, basemap.filter(|_| together.is_none()));
     // What each drone tells alone stands behind what all tell together.
     let (mean, alone) = match together {
         Some(together) => (Some(together), alone),
@@ -58,6 +61,8 @@ pub(super) fn air_section(
                 colour_bar(frames.as_ref().map_or(1.0, |frames| frames.difference_limit_mps)),
         }
     });
+    let film_shown = shown.is_some();
+    let explored = figures.explore(explorer(flight, &key, frames.as_ref(), film_shown));
     let still = |field: Option<&GridField<'_>>| {
         let frames = frames.as_ref()?;
         evolution::figure(flight, &key, frames, wind(flight), field)
@@ -107,12 +112,12 @@ pub(super) fn air_section(
         context! { correlations, averaging, ..scales::section(found) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, alone, posterior => words::sentences(map), statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, basemap => basemap.is_some() && flight.site.and_then(|site| site.origin_deg()).is_some(), mean, film => shown, explorer => explored, more, alone, posterior => words::sentences(map), statistics, errors => errors::section(map) },
     )
 }
 
 /// Where the fleet's mean wind blows to, [forward, left] in m/s, where speed and direction are known.
-fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
+pub(super) fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
     let wind = flight.statistics.as_ref()?.wind.as_ref()?;
     let (speed, from_deg) = (wind.speed_mps?.value, wind.from_deg?);
     // Clockwise from forward, as seen from above.
@@ -124,7 +129,7 @@ fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
 }
 
 /// A colour bar of the page: its gradient and the numbers below it.
-fn colour_bar(limit: f64) -> Value {
+pub(super) fn colour_bar(limit: f64) -> Value {
     let colours: Vec<String> = (0..=20).map(|i| diverging(f64::from(i) / 10.0 - 1.0)).collect();
     let decimals = decimals_of(limit / 2.0);
     let ticks: Vec<String> =

@@ -1,5 +1,12 @@
 //! The part of the page that tells of one flight: its tables, its fleet, its drones.
 
+use std::collections::BTreeMap;
+use std::io;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use minijinja::context;
 use minijinja::value::Value;
 use rayon::prelude::*;
@@ -13,6 +20,7 @@ use super::compare::{
     scatter_line, table_heading,
 };
 use super::drone_table::drone_table;
+use super::explorer::{explorer, pick};
 use super::figures::drone::{Axes, drawable};
 use super::figures::{drone as figure_drone, fleet};
 use super::fill::OPEN_LIMIT;
@@ -24,8 +32,9 @@ use super::notes::{
 use super::page::{Gallery, capitalised, flight_key};
 use super::text::{clean, kind, purpose, signed};
 
-/// Bytes of drawings of single drones that the page carries; further drones are only in files.
-const DRONE_FIGURE_BYTES: usize = 2_800_000;
+/// Bytes of drawings of single drones that the page carries, before they are compressed to a sixth; further drones are
+/// only in files.
+const DRONE_FIGURE_BYTES: usize = 6_000_000;
 /// Drones that get a drawing at all, in one flight.
 const DRONE_FIGURE_LIMIT: usize = 400;
 
@@ -52,9 +61,12 @@ pub(super) fn flight_section(
         .map(|figure| figures.show_linked(figure));
     // Numbered after the fleet, below which it stands.
     let drones = gallery.map(|gallery| {
-        let Gallery3 { shown, choices, left_out, undrawn } = gallery;
-        context! { shown => figures.show(shown), choices, left_out, undrawn }
+        let Gallery3 { shown, choices, packed, left_out, undrawn } = gallery;
+        context! { shown => figures.show(shown), choices, packed, left_out, undrawn }
     });
+    // Where there is a map, they stand with it.
+    let explored = flight.map.is_none().then(|| explorer(flight, &key, None, false)).flatten();
+    let explored = figures.explore(explored);
     let map_law = flight.map.as_ref().map(|map| map.law.name());
     let table: Vec<Value> = flight
         .table
@@ -97,6 +109,7 @@ pub(super) fn flight_section(
         own,
         windows => window_kinds(flight),
         gallery => drones,
+        explorer => explored,
         fleet,
         map_law,
         head,
@@ -127,6 +140,8 @@ pub(super) fn flight_section(
 struct Gallery3 {
     shown: Figure,
     choices: Vec<Value>,
+    /// The other drawings, compressed; empty: there are none.
+    packed: String,
     left_out: usize,
     undrawn: usize,
 }
@@ -151,6 +166,7 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
     let axes = Axes::of(flight);
     let mut bytes = 0;
     let mut choices = Vec::new();
+    let mut inside_page = BTreeMap::new();
     let mut shown = None;
     let undrawn = flight.drones.len() - wanted.len();
     let mut left_out = 0;
@@ -171,10 +187,13 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
         if inside {
             choices.push(context! {
                 label,
+                pick => pick(drone.slot, &drone.name),
                 name => figure.name.clone(),
-                svg => Value::from_safe_string(figure.svg.clone()),
                 first => is_first,
             });
+            if !is_first {
+                inside_page.insert(figure.name.clone(), figure.svg.clone());
+            }
         } else {
             left_out += 1;
         }
@@ -184,7 +203,20 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
             figures.files.push((figure.name, figure.svg));
         }
     }
-    Some(Gallery3 { shown: shown?, choices, left_out, undrawn })
+    Some(Gallery3 { shown: shown?, choices, packed: compressed(&inside_page), left_out, undrawn })
+}
+
+/// Drawings by their names, as `templates/report/unpack.js` reads them: JSON, compressed, base64. Together they take a
+/// sixth of what they do as they are.
+fn compressed(drawings: &BTreeMap<String, String>) -> String {
+    if drawings.is_empty() {
+        return String::new();
+    }
+    let mut packer = ZlibEncoder::new(Vec::new(), Compression::default());
+    let packed = serde_json::to_writer(&mut packer, drawings).map_err(io::Error::from);
+    packed
+        .and_then(|()| packer.finish())
+        .map_or_else(|_| String::new(), |bytes| STANDARD.encode(bytes))
 }
 
 /// How many windows of each kind all drones have: `14 up × …` as words.

@@ -86,7 +86,7 @@ pub fn render_sensitivity(
     };
     let html = fill("sensitivity.html", PAGE, values)?;
     let files = figures.into_iter().map(|figure| (figure.name, figure.svg)).collect();
-    Ok(Report { html, figures: files })
+    Ok(Report { html, figures: files, data: Vec::new() })
 }
 
 fn verdict(study: &SensitivityResult, is_sobol: bool) -> Vec<String> {

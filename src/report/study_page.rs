@@ -57,7 +57,7 @@ pub fn render_study(study: &StudyResult, provenance: &Provenance) -> Result<Repo
     };
     let html = fill("study.html", PAGE, values)?;
     let files = figures.into_iter().map(|figure| (figure.name, figure.svg)).collect();
-    Ok(Report { html, figures: files })
+    Ok(Report { html, figures: files, data: Vec::new() })
 }
 
 fn verdict(study: &StudyResult) -> Vec<String> {

@@ -126,6 +126,12 @@ impl Drawing {
         let _ = write!(self.body, "<g><title>{}</title>", escape(&clean(tooltip)));
     }
 
+    /// Opens a group with a tooltip that stands for a drone, in all parts of the page.
+    pub(super) fn open_drone(&mut self, pick: &str, tooltip: &str) {
+        let (pick, tooltip) = (escape(&clean(pick)), escape(&clean(tooltip)));
+        let _ = write!(self.body, "<g data-pick=\"{pick}\"><title>{tooltip}</title>");
+    }
+
     /// Closes the innermost group.
     pub(super) fn close(&mut self) {
         self.body.push_str("</g>");

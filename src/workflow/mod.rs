@@ -33,6 +33,7 @@
 
 pub mod analyze;
 pub mod archive;
+pub mod basemap;
 pub mod blind;
 pub mod check;
 pub mod clock;

@@ -262,6 +262,13 @@ for (const film of document.querySelectorAll(".film")) {
         pen.stroke();
       }
     }
+    const picked = data.picks.indexOf(updraft.picked);
+    if (data.places[picked]) {
+      pen.strokeStyle = "#d55e00";
+      pen.lineWidth = 2.5;
+      pen.strokeRect(across(data.places[picked][1]) - side / 2, down(data.places[picked][0]) - side / 2, side, side);
+      pen.lineWidth = 1;
+    }
     pen.strokeStyle = "#b4bcc4";
     pen.strokeRect(pad.left + 0.5, pad.top + 0.5, wide * scale - 1, tall * scale - 1);
     pen.fillStyle = "#66727f";
@@ -277,6 +284,7 @@ for (const film of document.querySelectorAll(".film")) {
   const reading = film.querySelector(".reading");
   const speed = film.querySelector("select");
   const button = film.querySelector(".play");
+  const flight = film.id.replace("film-", "");
   slider.max = frames - 1;
   const signed = (mms) => {
     if (mms === NONE) return "no value";
@@ -317,6 +325,7 @@ for (const film of document.querySelectorAll(".film")) {
     slider.setAttribute("aria-valuetext", `show time ${words}`);
     screens.forEach(draw);
     read();
+    updraft.time(flight, s, film);
   };
 
   // Playing: show seconds pass `speed` times as fast as real ones.
@@ -347,6 +356,7 @@ for (const film of document.querySelectorAll(".film")) {
     if (playing) return stop();
     if (frame >= frames - 1) show(0);
     playing = true;
+    updraft.plays(film);
     film.dataset.playing = "yes";
     button.textContent = "❚❚ Pause";
     last = null;
@@ -398,11 +408,20 @@ for (const film of document.querySelectorAll(".film")) {
       });
       read();
     });
+    screen.canvas.addEventListener("click", () => pointed !== null && updraft.pick(data.picks[pointed], film));
     screen.canvas.addEventListener("pointerleave", () => {
       pointed = null;
       read();
     });
   }
+  // What the other parts of the page show.
+  document.addEventListener("updraft:pick", () => screens.forEach(draw));
+  document.addEventListener("updraft:play", ({ detail }) => detail.from !== film && stop());
+  document.addEventListener("updraft:time", ({ detail }) => {
+    if (detail.flight !== flight || detail.from === film || playing) return;
+    const after = data.times.findIndex((s) => s > detail.seconds);
+    jump(after < 0 ? frames - 1 : Math.max(0, after - 1));
+  });
   new ResizeObserver(() => screens.forEach(draw)).observe(film);
   stop();
   show(0);

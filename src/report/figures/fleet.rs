@@ -8,6 +8,7 @@ use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis};
 use crate::report::Figure;
 use crate::report::axis::{Axis, decimals_of};
 use crate::report::colour::{FAINT, INK, MUTED, RULE};
+use crate::report::explorer::pick;
 use crate::report::offset_field::OffsetScale;
 use crate::report::raster::{Pixel, image};
 use crate::report::svg::{Anchor, Drawing, TextStyle, escape};
@@ -239,9 +240,10 @@ fn cell(
     }
     if let Some(name) = &figure {
         drawing.raw(&format!(
-            "<a href=\"{}.svg\" data-drone=\"{}\" aria-label=\"{}: open its calibration\">",
+            "<a href=\"{}.svg\" data-drone=\"{}\" data-pick=\"{}\" aria-label=\"{}: open its calibration\">",
             escape(name),
             escape(name),
+            escape(&pick(drone.slot, &drone.name)),
             escape(&clean(&drone.name)),
         ));
     }

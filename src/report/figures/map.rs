@@ -1,11 +1,14 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
 use super::air::{mean, mean_truth};
+use super::map_marks::{MARKS_HEIGHT, ground, ground_words, marks};
 use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
 use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, UpdraftMap};
 use crate::base::estimate::Estimate;
 use crate::report::Figure;
+use crate::report::basemap::Basemap;
 use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
+use crate::report::explorer::pick;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, count, estimate, fixed, signed, usable};
 
@@ -50,10 +53,10 @@ impl Means {
 /// The map of mean updrafts; `None` if no drone has a position. `key` names the flight in files.
 pub(in crate::report) fn mean_map(
     analysis: &Analysis,
-    flight: &FlightAnalysis,
-    key: &str,
+    (flight, key): (&FlightAnalysis, &str),
     map: &UpdraftMap,
     means: Means,
+    basemap: Option<&Basemap>,
 ) -> Option<Figure> {
     let mut positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
     if positions.is_empty() {
@@ -79,11 +82,17 @@ pub(in crate::report) fn mean_map(
     let truth_known = truths.iter().any(Option::is_some);
     // Two maps beside each other, or one that fills the sheet.
     let (top, room) = if truth_known { (40.0, [424.0, 424.0]) } else { (16.0, [800.0, 620.0]) };
-    let projection = Projection::new(&positions, [70.0, top], room, 0.5)?;
+    // Over a picture some ground is left around the drones.
+    let margin = if basemap.is_some() { 1.5 } else { 0.5 };
+    let projection = Projection::new(&positions, [70.0, top], room, margin)?;
     let [width, height] = projection.size();
     let limit = scale_of(map, means);
     let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
-    let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
+    let mut drawing =
+        Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0 + MARKS_HEIGHT);
+    if let Some(basemap) = basemap {
+        ground(&mut drawing, &projection, flight, basemap);
+    }
     let cell_px = positions.first().map_or(0.0, |place| projection.cell(*place)[2]);
     // As many decimals as the largest error asks for, the same in all cells.
     let largest = map.drones.iter().map(|drone| means.of(drone).se).filter(|se| usable(*se));
@@ -103,8 +112,10 @@ pub(in crate::report) fn mean_map(
         filled_cell(&mut drawing, drone, *mean, projection.cell(drone.position_m), limit, text);
     }
     axes(&mut drawing, &projection);
+    let below = top + height.max(220.0) + 58.0 + MARKS_HEIGHT / 2.0;
+    marks(&mut drawing, &projection, flight, [projection.origin()[0], below]);
     if truth_known {
-        let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
+        let aside = Projection::new(&positions, [100.0 + width, top], room, margin)?;
         for (slot, home) in &empty {
             empty_cell(&mut drawing, *slot, aside.cell(*home), text);
         }
@@ -174,8 +185,9 @@ pub(in crate::report) fn mean_map(
         title,
         caption: format!(
             "The grid seen from above, one square for each of {}: the mean vertical air speed \
-             over the hover{what}{numbers}. Red is rising air, blue sinking, white none.{beside}{lost}{dashed}",
+             over the hover{what}{numbers}. Red is rising air, blue sinking, white none.{beside}{lost}{dashed}{}",
             count(positions.len() - empty.len() - filled.len(), "drone"),
+            ground_words(flight, basemap),
         ),
     })
 }
@@ -285,12 +297,15 @@ fn mean_cell(
 ) {
     let place = mean.value / limit;
     let fill = if usable(mean.value) { diverging(place) } else { "#ffffff".to_owned() };
-    drawing.open(&format!(
-        "{}: {} m/s, {} mapping",
-        clean(&drone.name),
-        estimate(mean),
-        drone.mapping.name(),
-    ));
+    drawing.open_drone(
+        &pick(drone.slot, &drone.name),
+        &format!(
+            "{}: {} m/s, {} mapping",
+            clean(&drone.name),
+            estimate(mean),
+            drone.mapping.name(),
+        ),
+    );
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
     if let Some(decimals) = text.decimals {
         let colour = if usable(mean.value) { ink_on_diverging(place) } else { MUTED };

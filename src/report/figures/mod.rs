@@ -11,6 +11,7 @@ pub(super) mod gap;
 pub(super) mod laws;
 pub(super) mod levelled;
 pub(super) mod map;
+mod map_marks;
 mod plan_view;
 pub(super) mod posterior;
 pub(super) mod sensitivity;

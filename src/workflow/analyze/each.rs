@@ -225,7 +225,7 @@ fn found(folder: &Path, wanted: &AnalysisRecord) -> Option<AnalysisRecord> {
 /// Files that an analysis writes: numbers, fields and pages.
 fn outputs(folder: &Path) -> Result<Vec<OutputState>, WorkflowError> {
     let mut files = vec![folder.join("analysis.json")];
-    for below in ["fields", "report", "report/figures"] {
+    for below in ["fields", "report", "report/figures", "report/data"] {
         files.extend(files_in(&folder.join(below))?);
     }
     files.retain(|file| file.is_file());

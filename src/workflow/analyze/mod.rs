@@ -34,8 +34,7 @@ use crate::campaign;
 use crate::campaign::origin::LogOrigin;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
-use crate::report::{self, Provenance};
-use crate::study::result::StudyResult;
+use crate::report::{self, Basemap, Beside, Provenance};
 
 /// Analyses the simulated logs of a campaign, and writes numbers and report into its folder.
 ///
@@ -132,7 +131,14 @@ impl<'a> Analysing<'a> {
         analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
         host.check_stop()?;
         let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
-        Ok(Analysed { analysis, logs, provenance, root: work.root.clone(), some_absent })
+        Ok(Analysed {
+            analysis,
+            logs,
+            provenance,
+            root: work.root.clone(),
+            some_absent,
+            basemap: None,
+        })
     }
 }
 
@@ -216,9 +222,17 @@ pub struct Analysed {
     root: PathBuf,
     /// Flights that were found gave nothing at all.
     some_absent: bool,
+    /// Picture of the ground below the report's maps.
+    basemap: Option<Basemap>,
 }
 
 impl Analysed {
+    /// Puts a picture of the ground below the report's maps.
+    #[must_use]
+    pub fn on(self, basemap: Option<Basemap>) -> Self {
+        Self { basemap, ..self }
+    }
+
     /// Writes numbers and report into a folder. Returns the path of the page; `None` if the page
     /// says that nothing was found.
     ///
@@ -236,7 +250,11 @@ impl Analysed {
             ..self.provenance.clone().unwrap_or_default()
         };
         let (page_made, fields_made) = rayon::join(
-            || write_report(&self.analysis, study.as_ref(), &provenance, &report_folder),
+            || {
+                let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
+                let made = report::render_with(&self.analysis, beside, &provenance)?;
+                Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
+            },
             || write_fields(&self.analysis, folder),
         );
         page_made.and(fields_made)?;
@@ -279,20 +297,6 @@ impl Analysed {
             Yield::Whole | Yield::Partial => Ok(Ending::Losses),
         }
     }
-}
-
-/// The page with its figures.
-fn write_report(
-    analysis: &Analysis,
-    study: Option<&StudyResult>,
-    provenance: &Provenance,
-    folder: &Path,
-) -> Result<(), WorkflowError> {
-    let made = match study {
-        Some(study) => report::render_with_study(analysis, study, provenance)?,
-        None => report::render(analysis, provenance)?,
-    };
-    Ok(report::write(&made, folder)?)
 }
 
 /// All numbers; the path of their file.

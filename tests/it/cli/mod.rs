@@ -10,6 +10,7 @@ mod analyze;
 mod analyze_inputs;
 mod analyze_messages;
 mod analyze_unplanned;
+mod basemap;
 mod blind_game;
 mod check;
 mod compare;

@@ -162,8 +162,11 @@ fn origin(address: &str) -> Option<String> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Key {
     Right,
+    Down,
     Home,
     PageDown,
+    End,
+    Plus,
     Space,
     Enter,
     Tab,
@@ -239,6 +242,39 @@ impl Tab<'_> {
         }
     }
 
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], clicks: u32) {
+        let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": clicks });
+        self.call("Input.dispatchMouseEvent", &event);
+    }
+
+    /// Presses the button at a place, and lets it go at another.
+    pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
+        self.mouse("mouseMoved", from, 0);
+        self.mouse("mousePressed", from, 1);
+        for step in 1..=10 {
+            let share = f64::from(step) / 10.0;
+            let at = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+            self.mouse("mouseMoved", at, 0);
+        }
+        self.mouse("mouseReleased", to, 1);
+    }
+
+    /// A double click.
+    pub(crate) fn double_click(&mut self, at: [f64; 2]) {
+        self.mouse("mouseMoved", at, 0);
+        for clicks in [1, 2] {
+            self.mouse("mousePressed", at, clicks);
+            self.mouse("mouseReleased", at, clicks);
+        }
+    }
+
+    /// Turns the wheel at a place.
+    pub(crate) fn wheel(&mut self, [x, y]: [f64; 2], down: f64) {
+        let event = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": down });
+        self.call("Input.dispatchMouseEvent", &event);
+        self.sleep_ms(50);
+    }
+
     /// A real click in the middle of an element, brought into view first.
     pub(crate) fn click_on(&mut self, selector: &str) {
         let quoted = json!(selector);
@@ -253,6 +289,9 @@ impl Tab<'_> {
     pub(crate) fn press(&mut self, key: Key) {
         let (name, code, text, number) = match key {
             Key::Right => ("ArrowRight", "ArrowRight", "", 39),
+            Key::Down => ("ArrowDown", "ArrowDown", "", 40),
+            Key::End => ("End", "End", "", 35),
+            Key::Plus => ("+", "Equal", "+", 187),
             Key::Home => ("Home", "Home", "", 36),
             Key::PageDown => ("PageDown", "PageDown", "", 34),
             Key::Space => (" ", "Space", " ", 32),
@@ -332,7 +371,13 @@ impl Tab<'_> {
                 "Network.requestWillBeSent" => {
                     let url = parameters["request"]["url"].as_str().unwrap_or("");
                     let site = origin(address).filter(|site| url.starts_with(site.as_str()));
-                    let own = url.starts_with("data:") || url == address || site.is_some();
+                    // Files of data lie beside the page.
+                    let data =
+                        address.rsplit_once('/').map(|(folder, _)| format!("{folder}/data/"));
+                    let beside =
+                        data.is_some_and(|data| url.starts_with("file:") && url.starts_with(&data));
+                    let own =
+                        beside || url.starts_with("data:") || url == address || site.is_some();
                     (!own).then(|| format!("fetched {url}"))
                 }
                 _ => None,

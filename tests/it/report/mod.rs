@@ -3,6 +3,7 @@
 mod browser;
 mod browser_access;
 pub(crate) mod chromium;
+mod explorer;
 mod fields;
 mod gap;
 mod page;

@@ -5,6 +5,7 @@
 #![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
 
 mod posterior;
+mod traces;
 mod whole;
 
 use std::f64::consts::TAU;
@@ -26,6 +27,8 @@ use updraft::report::{InputFile, Provenance};
 
 #[allow(unused_imports, reason = "each test binary uses a part")]
 pub(crate) use posterior::posterior;
+#[allow(unused_imports, reason = "each test binary uses a part")]
+pub(crate) use traces::{crowd, traced};
 pub(crate) use whole::whole_campaign;
 
 /// The paper's simulated law.
