@@ -7,6 +7,8 @@
 //! Prints, for each rate, how far apart the vertical air speeds of all drones and seconds are: each drone's own, and
 //! those of all drones together (the posterior).
 
+#![expect(clippy::print_stdout, reason = "its output")]
+
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,7 +21,7 @@ use updraft::mission::plan::Purpose;
 use updraft::workflow::analyze::{Settings, one_input};
 use updraft::workflow::find::{Found, Work, find};
 
-const RATES_HZ: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
+const RATES_HZ: [f64; 3] = [4.0, 2.0, 1.0];
 /// Rate of the battery's messages, whatever the others have.
 const BATTERY_HZ: f64 = 1.0;
 

@@ -322,7 +322,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
     let Shared { input, options, .. } = shared;
     let Account { ones, unused, partly_used } = account;
     let fixes = ones.iter().filter_map(|one| one.first_fix_deg);
-    let site = input.plan.map(FlightSite::of_plan).or_else(|| FlightSite::of_fixes(fixes));
+    let site = input.plan.map(FlightSite::of_plan).or_else(|| FlightSite::of_fixes(&fixes));
     let climbed: Vec<(usize, usize)> = (ones.iter().filter(|one| one.calibration.is_ok()))
         .map(|one| rungs(&one.drone.windows, &options.fit))
         .collect();

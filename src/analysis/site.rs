@@ -39,7 +39,7 @@ impl FlightSite {
     }
 
     /// The middle of first fixes, (latitude, longitude), degrees; `None` without any.
-    pub(super) fn of_fixes(fixes: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
+    pub(super) fn of_fixes(fixes: &(impl Iterator<Item = (f64, f64)> + Clone)) -> Option<Self> {
         let known = |fix: &(f64, f64)| fix.0.abs() <= 90.0 && fix.1.abs() <= 180.0;
         let middle =
             |of: fn((f64, f64)) -> f64| upper_median(fixes.clone().filter(known).map(of).collect());
@@ -55,8 +55,8 @@ mod tests {
     #[test]
     fn without_a_plan_the_middle_drone_is_the_place() {
         let fixes = [(47.1, 19.3), (f64::NAN, 0.0), (47.3, 19.1), (47.2, 19.2)];
-        let site = FlightSite::of_fixes(fixes.into_iter()).unwrap();
+        let site = FlightSite::of_fixes(&fixes.into_iter()).unwrap();
         assert_eq!((site.lat_deg, site.lon_deg, site.planned), (47.2, 19.2, false));
-        assert_eq!(FlightSite::of_fixes([].into_iter()), None);
+        assert_eq!(FlightSite::of_fixes(&[].into_iter()), None);
     }
 }

@@ -83,7 +83,6 @@ pub fn exit_of(error: &CommandError) -> Exit {
         E::Compare(CompareError::NothingInCommon { .. } | CompareError::Nothing { .. }) => {
             Exit::Nothing
         }
-        E::Compare(_) => Exit::Usage,
         E::Output(error) if is_end_of_pipe(error) => Exit::Done,
         E::Log(LogError::Open { .. })
         | E::File(_)
@@ -92,7 +91,7 @@ pub fn exit_of(error: &CommandError) -> Exit {
         | E::Report(_)
         | E::Output(_)
         | E::Failed(_) => Exit::Failed,
-        E::Effect(_) | E::Log(_) | E::Usage(_) => Exit::Usage,
+        E::Compare(_) | E::Effect(_) | E::Log(_) | E::Usage(_) => Exit::Usage,
         E::Nothing(_) => Exit::Nothing,
         E::Missing { .. } => Exit::Losses,
         E::Unsafe(_) => Exit::Unsafe,

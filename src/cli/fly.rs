@@ -149,10 +149,14 @@ fn fly_target(
             let mut crew = Crew::new(&host, &mut handler, &folder, &plan);
             crew.is_guided = args.guided;
             let flown = crew.listen(args.connect.wait).and_then(|()| fly(&host, &mut crew, &wish));
-            let (flight, ending) = crew.ending(flown)?;
-            if !flight.logs.iter().all(LogOutput::is_missing) {
+            let ended = crew.ending(flown);
+            let is_home =
+                |(flight, _): &(FlightOutput, _)| !flight.logs.iter().all(LogOutput::is_missing);
+            if ended.as_ref().is_ok_and(is_home) {
                 live.show_logs(&host);
             }
+            live.tell_end(&ended);
+            let (flight, ending) = ended?;
             Ok((vec![flight], ending.into()))
         }
         Target::Sim => {

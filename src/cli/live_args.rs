@@ -10,10 +10,13 @@ use rand::rngs::SysRng;
 
 use super::context::Context;
 use super::exit::CommandError;
+use crate::base::causes::with_causes;
 use crate::campaign::FlightFolder;
 use crate::live::source::Source;
 use crate::live::station::Station;
+use crate::live::view::{Level, Step};
 use crate::mission::Plan;
+use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
 use crate::workflow::live::{Address, AirWatch, AirWish, LiveWish, Served, serve};
 
@@ -55,6 +58,16 @@ impl Live {
         if let Some(air) = &mut self.air {
             air.show_logs(host);
         }
+    }
+}
+
+impl Live {
+    /// Says how it ended, in the words of the terminal.
+    pub(super) fn tell_end<T>(&self, ended: &Result<T, WorkflowError>) {
+        let (Some(station), Err(error)) = (&self.station, ended) else { return };
+        let words = with_causes(error, ": ");
+        station.say(Level::Alarm, &words);
+        station.step(Step::Over, &format!("The station has ended: {words}"));
     }
 }
 

@@ -118,7 +118,8 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         }
         if context.json {
             let refused = reports.iter().flat_map(|report| refusals(report, &args.allow));
-            let why: String = refused.map(|cause| format!("{BECAUSE}{cause}")).collect();
+            let why: Vec<String> = refused.map(|cause| format!("{BECAUSE}{cause}")).collect();
+            let why = why.concat();
             return Err(CommandError::Unsafe(format!(
                 "nothing was written: the show is not safe as it is{why}"
             )));

@@ -11,6 +11,7 @@ use super::side::{Couple, FlightOf, Side, couples};
 use super::structure;
 use crate::analysis::LawKind;
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 use crate::numeric::median;
 
@@ -161,7 +162,7 @@ fn laws_of(couple: &Couple<'_>, choice: LawChoice) -> Result<LawComparison, Stri
     let (a, b) = (of(couple.reference)?, of(couple.other)?);
     let indicators = [couple.reference, couple.other].map(|flight| flight.flight.indicator);
     if indicators[0] != indicators[1] {
-        let [one, other] = indicators.map(|indicator| indicator.words());
+        let [one, other] = indicators.map(Indicator::words);
         return Err(format!("one is of {one}, the other of {other}"));
     }
     if a.form != b.form {

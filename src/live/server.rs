@@ -22,6 +22,8 @@ use crate::link::clock::{Clock, MS, Micros, S};
 
 /// Connections at once: pages hold one each, and six at most come from one browser.
 const MOST_CONNECTIONS: usize = 64;
+/// Pages are told how it ended for so long at most, us.
+const FAREWELL: Micros = S;
 /// Longest that a request may take to come.
 const REQUEST: Micros = 5 * S;
 /// A page that takes nothing for so long is dropped.
@@ -128,8 +130,14 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
+        // Pages are told the last of it.
+        self.shared.look();
         self.shared.stop.store(true, Ordering::SeqCst);
         self.shared.fresh.notify_all();
+        let until = self.shared.now() + FAREWELL;
+        while self.shared.watched.load(Ordering::SeqCst) > 0 && self.shared.now() < until {
+            std::thread::sleep(Duration::from_millis(10));
+        }
         // Who waits for a connection gets one. A wildcard is no address to connect to.
         let mut to = self.address;
         if to.ip().is_unspecified() {
@@ -327,8 +335,12 @@ fn events(mut stream: &TcpStream, shared: &Shared, rank: Rank) -> io::Result<()>
     let _watching = Watching::begin(&shared.watched);
     shared.look();
     let mut seen: Option<(u64, usize, u64)> = None;
-    while !shared.is_over() {
+    loop {
+        let is_over = shared.is_over();
         let Some(looks) = shared.newer(seen.map_or(0, |(number, ..)| number)) else {
+            if is_over {
+                break;
+            }
             stream.write_all(b": still here\n\n")?;
             continue;
         };

@@ -193,6 +193,16 @@ impl Station {
         waits.clone_into(&mut now.waits);
     }
 
+    /// Nothing more follows, for a reason that was told or for none.
+    pub fn over(&self) {
+        let mut now = self.lock();
+        now.question = None;
+        if now.step != Step::Over {
+            now.step = Step::Over;
+            "The station's work is done".clone_into(&mut now.waits);
+        }
+    }
+
     /// The table before a start, as far as it is filled.
     pub fn preflight(&self, found: &Preflight) {
         let rows = found.rows.iter().map(|row| {
@@ -433,6 +443,10 @@ impl Station {
             has_slot: slot.is_some(),
         };
         let (level, why) = match drone {
+            // Who has landed may be switched off.
+            Some(_) if now.step >= Step::Logs && state.and_then(Drone::is_armed) == Some(false) => {
+                (Level::Good, String::new())
+            }
             Some(_) => trouble(&looked),
             None if now.step <= Step::Assigning => (Level::Good, String::new()),
             None => (Level::Warning, "nobody flies this slot".to_owned()),

@@ -98,8 +98,8 @@ fn list_sha256(inputs: &[InputFile]) -> String {
     let mut lines: Vec<(&str, &str)> =
         inputs.iter().map(|input| (input.path.as_str(), input.sha256.as_str())).collect();
     lines.sort_unstable();
-    let text: String = lines.iter().map(|(path, hash)| format!("{hash}  {path}\n")).collect();
-    sha256(text.as_bytes())
+    let lines: Vec<String> = lines.iter().map(|(path, hash)| format!("{hash}  {path}\n")).collect();
+    sha256(lines.concat().as_bytes())
 }
 
 #[cfg(test)]

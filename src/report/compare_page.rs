@@ -66,7 +66,7 @@ pub fn render_comparison(
         ..common(provenance),
     };
     let html = fill("compare.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files })
+    Ok(Report { html, figures: figures.files, data: Vec::new() })
 }
 
 /// Figures, numbered in the order in which they are shown.

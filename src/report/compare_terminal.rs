@@ -33,7 +33,9 @@ pub fn comparison_summary(comparison: &Comparison, width: usize, color: bool) ->
     if !equal.is_empty() {
         out.line("", "");
         out.line(BOLD, "All campaigns");
-        equal.iter().for_each(|sentence| out.wrapped("", sentence));
+        for sentence in &equal {
+            out.wrapped("", sentence);
+        }
     }
     out.list("Not compared", &comparison.not_compared);
     out.list("Notes", &comparison.notes);
@@ -78,15 +80,23 @@ impl Output {
         }
         self.line("", "");
         self.line(YELLOW, &format!("{heading} ({})", items.len()));
-        items.iter().for_each(|item| self.wrapped("", &format!("- {}", clean(item))));
+        for item in items {
+            self.wrapped("", &format!("- {}", clean(item)));
+        }
     }
 
     fn law(&mut self, law: &LawComparison) {
         self.line("", "");
         self.line(BOLD, &words::pair(&law.pair));
-        words::drone_sentences(law).iter().for_each(|sentence| self.wrapped("", sentence));
-        words::fleet_sentence(law).iter().for_each(|sentence| self.wrapped("", sentence));
-        words::errors_sentence(law).iter().for_each(|sentence| self.wrapped(DIM, sentence));
+        for sentence in &words::drone_sentences(law) {
+            self.wrapped("", sentence);
+        }
+        if let Some(sentence) = &words::fleet_sentence(law) {
+            self.wrapped("", sentence);
+        }
+        if let Some(sentence) = &words::errors_sentence(law) {
+            self.wrapped(DIM, sentence);
+        }
         self.line("", "");
         let columns = [
             column("fleet", Align::Left, 0),
@@ -164,7 +174,9 @@ impl Output {
     fn map(&mut self, map: &MapComparison) {
         self.line("", "");
         self.line(BOLD, &words::pair(&map.pair));
-        words::map_sentences(map).iter().for_each(|sentence| self.wrapped("", sentence));
+        for sentence in &words::map_sentences(map) {
+            self.wrapped("", sentence);
+        }
         if map.scales.is_empty() {
             return;
         }

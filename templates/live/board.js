@@ -14,7 +14,7 @@ function makeRow(key) {
   const cells = Array.from({ length: 11 }, (_, index) => {
     const cell = document.createElement("td");
     if (index === 0) { cell.className = "pick"; cell.append(pick); }
-    if (index === 3) cell.className = "words";
+    if (index === 4) cell.className = "words";
     row.append(cell);
     return cell;
   });
@@ -51,9 +51,9 @@ function drawRow(drone) {
     : drone.drone && drone.drone !== String(drone.slot) ? `${drone.slot} (drone ${drone.drone})` : String(drone.slot);
   const parts = [drone.trouble, drone.order, drone.words].filter((text) => text && text !== drone.stage);
   [
-    slot, drone.stage || "–", parts.filter((text, i) => parts.indexOf(text) === i).join(" · "), null, loss + signal, gps,
+    slot, drone.stage || "–", air, parts.filter((text, i) => parts.indexOf(text) === i).join(" · "), null, loss + signal, gps,
     battery + minutes, drone.place_m ? `${fixed(drone.place_m[2], 1)} m` : "–",
-    drone.distance_m === null ? "–" : `${fixed(drone.distance_m, 1)} m`, air,
+    drone.distance_m === null ? "–" : `${fixed(drone.distance_m, 1)} m`,
   ].forEach((text, index) => { if (text !== null) setText(cells[index + 1], text); });
 }
 
@@ -61,7 +61,7 @@ function drawRow(drone) {
 function drawAges() {
   const now = Date.now() + state.ahead_ms;
   for (const drone of state.drones) {
-    const cell = rows.get(keyOf(drone))?.cells[4];
+    const cell = rows.get(keyOf(drone))?.cells[5];
     if (!cell) continue;
     if (drone.heard_ms === null) { setText(cell, "–"); continue; }
     const age = Math.max(0, (now - drone.heard_ms) / 1000);
@@ -91,14 +91,19 @@ function sortRows() {
   if (focused !== document.activeElement && body.contains(focused)) focused.focus({ preventScroll: true });
 }
 
+/* Who was heard within this time counts. */
+const HEARD_MS = 10000;
+
 function drawBoardSum() {
   const count = { good: 0, notice: 0, warning: 0, alarm: 0 };
   for (const drone of state.drones) count[drone.level] += 1;
   const parts = [["alarm", "alarm"], ["warning", "in trouble"], ["notice", "to look at"], ["good", "good"]]
     .filter(([level]) => count[level]).map(([level, word]) => `${count[level]} ${word}`);
   setText(byId("board-sum"), parts.join(", ") || "no drone yet");
-  const heard = state.drones.filter((drone) => drone.heard_ms !== null).length;
-  setText(byId("count"), state.drones.length ? `${heard} of ${state.drones.length}` : "–");
+  const since = Date.now() + state.ahead_ms - HEARD_MS;
+  const heard = state.drones.filter((drone) => drone.heard_ms !== null && drone.heard_ms > since).length;
+  const of = state.facts?.is_replay ? `${state.drones.length}` : `${heard} of ${state.drones.length}`;
+  setText(byId("count"), state.drones.length ? of : "–");
 }
 
 function drawPreflight() {

@@ -75,6 +75,7 @@ let asked = 0;
 
 function drawQuestion(question) {
   byId("question").hidden = !question;
+  if (question && question.number !== asked) setText(byId("order-said"), "");
   if (!question || question.number === asked) { if (!question) asked = 0; return; }
   asked = question.number;
   setText(byId("question-text"), question.text);
@@ -96,7 +97,7 @@ function drawQuestion(question) {
       }
       const { ok, text } = await wish({ wish: "answer", question: question.number, answer: word });
       byId("order-said").className = ok ? "good" : "alarm";
-      setText(byId("order-said"), ok ? does : text);
+      setText(byId("order-said"), ok ? `Answered: ${does}. What follows is said by the station.` : text);
     });
     return button;
   }));

@@ -181,7 +181,9 @@ fn with_orders(
     let mut handler = order_handler(&host, &mut tap, &folder);
     let mut crew = Crew::new(&host, &mut handler, &folder, &plan);
     let ended = body(&host, &mut crew);
-    crew.ending(ended)
+    let ended = crew.ending(ended);
+    live.tell_end(&ended);
+    ended
 }
 
 fn step_station(context: &Context, args: &StepArgs) -> Result<Station, CommandError> {

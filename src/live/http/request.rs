@@ -6,7 +6,7 @@ use crate::base::plain::plain_string;
 /// Most bytes of a request's line and headers.
 pub const MOST_HEAD_BYTES: usize = 16 << 10;
 /// Most bytes of a body.
-pub const MOST_BODY_BYTES: usize = 4 << 10;
+pub const MOST_BODY_BYTES: usize = 16 << 10;
 /// Most headers.
 const MOST_HEADERS: usize = 64;
 

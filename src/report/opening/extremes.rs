@@ -62,9 +62,7 @@ fn ends<T: Copy>(
     values: impl Iterator<Item = (Estimate, T)> + Clone,
 ) -> Option<[(Estimate, T); 2]> {
     let by = |a: &(Estimate, T), b: &(Estimate, T)| a.0.value.total_cmp(&b.0.value);
-    if values.clone().nth(1).is_none() {
-        return None;
-    }
+    values.clone().nth(1)?;
     Some([values.clone().max_by(by)?, values.min_by(by)?])
 }
 

@@ -31,7 +31,7 @@ pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
             )
         };
         doubts.extend(lost(flight).map(of));
-        doubts.extend(flight.warnings.iter().filter_map(doubt).map(of));
+        doubts.extend(flight.warnings.iter().map(doubt).map(of));
         doubts.extend(flight.map.as_ref().and_then(largest_error).map(of));
         doubts.extend(flight.map.as_ref().and_then(too_narrow).map(of));
     }
@@ -56,10 +56,12 @@ fn lost(flight: &FlightAnalysis) -> Option<Doubt> {
     Some((badness, format!("{lost} of {} gave no result.", count(of, "drone"))))
 }
 
+type Part = fn(&CommonError) -> f64;
+
 /// The largest part of the error that all drones share.
 fn largest_error(map: &UpdraftMap) -> Option<Doubt> {
     let common = map.common.as_ref().filter(|common| usable(common.se_mps))?;
-    let parts: [(fn(&CommonError) -> f64, &str); 5] = [
+    let parts: [(Part, &str); 5] = [
         (
             |c| c.zero_mps,
             "the zero: the air may have risen or sunk slowly while the drones were calibrated",
@@ -106,14 +108,13 @@ fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
     })
 }
 
-/// A warning as a doubt of the first page; `None`: told elsewhere, or of no weight for the air.
-fn doubt(warning: &Warning) -> Option<Doubt> {
+/// A warning as a doubt of the first page.
+fn doubt(warning: &Warning) -> Doubt {
     let own = || sentence(&warning.to_string());
-    Some(match warning {
+    match warning {
         Warning::WhoseLogs(_) | Warning::Failed(_) => (0, own()),
         Warning::NoLaw | Warning::NoFlock(_) | Warning::NoCalibration | Warning::NoLadder { .. } => (1, own()),
         Warning::FewWindows { .. } | Warning::FleetLadder { .. } | Warning::OtherStart { .. } => (2, own()),
-        Warning::PlainMap | Warning::Battery { .. } => (3, own()),
         Warning::Wind { corrected, error_mps, .. } => (
             if *corrected == WindHandled::Not { 2 } else { 4 },
             match corrected {
@@ -146,5 +147,5 @@ fn doubt(warning: &Warning) -> Option<Doubt> {
         ),
         Warning::TiltForm { .. } => (7, own()),
         _ => (3, own()),
-    })
+    }
 }

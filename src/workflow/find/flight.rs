@@ -94,8 +94,8 @@ pub(super) fn found_flight(
 
 /// Whether the logs are of virtual drones, by the first that can be read: no fleet is of both.
 fn of_virtual_drones(logs: &[LogInput]) -> bool {
-    let taken = logs.iter().filter(|log| log.refused.is_none());
-    taken.filter_map(|log| is_of_simulator(&log.path)).next().unwrap_or_default()
+    let mut taken = logs.iter().filter(|log| log.refused.is_none());
+    taken.find_map(|log| is_of_simulator(&log.path)).unwrap_or_default()
 }
 
 /// The record, if most of the logs are still those that it speaks of: somebody may have put the logs

@@ -50,7 +50,10 @@ pub(crate) fn fly_now(
     let mut start = crew.announce(lead.options())?;
     say_start(host, crew, &start, "Every drone has the start time");
     let yes = lead.yes || {
-        let answer = asked(host, "Authorize the start? Type yes: ", || crew.idle());
+        let answer = asked(host, "Authorize the start? Type yes: ", || {
+            crew.idle()?;
+            crew.in_time(&start)
+        });
         if !matches!(answer, Ok(true)) {
             crew.cancel(&mut start)?;
         }

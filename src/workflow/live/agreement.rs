@@ -73,7 +73,7 @@ impl fmt::Display for Agreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { values, correlation, bias_mps, stated_mps, inside } = self;
         let side = if *bias_mps < 0.0 { "low" } else { "high" };
-        write!(f, "the page's air was {:.2} m/s too {side} on average", bias_mps.abs())?;
+        write!(f, "The page's air was {:.2} m/s too {side} on average", bias_mps.abs())?;
         write!(f, " (it stated +- {stated_mps:.2} m/s) by {values} values of the logs")?;
         if let Some(correlation) = correlation {
             write!(f, ", correlation {correlation:.2}")?;
@@ -107,7 +107,7 @@ mod tests {
         assert!((correlation - 0.990_881_802).abs() < 1e-6, "{correlation}");
         assert_eq!(
             found.to_string(),
-            "the page's air was 0.20 m/s too low on average (it stated +- 0.20 m/s) by 4 values of the \
+            "The page's air was 0.20 m/s too low on average (it stated +- 0.20 m/s) by 4 values of the \
              logs, correlation 0.99, 75 % of them inside of its 95 % intervals"
         );
         assert_eq!(Agreement::of(&looks[2..], &logged), None);

@@ -19,7 +19,7 @@ use crate::base::plain::Shown as _;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::{FlightFolder, read_json};
 use crate::live::station::Station;
-use crate::live::view::{AirView, Step};
+use crate::live::view::{AirView, Level, Step};
 use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric;
@@ -39,6 +39,9 @@ const WINDOW_S: f64 = 180.0;
 const CLOSEST: Micros = 4 * S;
 /// Time between looks, in times that one takes.
 const SHARE: u32 = 19;
+/// Error of a drone's mean over 10 s by messages that are too few, times their rate, m/s Hz: measured with logs that
+/// were thinned (`examples/thinned_telemetry.rs`).
+const COST_MPS_HZ: f64 = 0.11;
 /// Motors of a vehicle, on its first outputs: all that updraft knows have four.
 const MOTORS: usize = 4;
 
@@ -90,12 +93,16 @@ impl AirWatch {
         if found.purpose != Some(Purpose::Measurement) {
             return Ok(None);
         }
+        let tell = |text: &str| {
+            host.say(text);
+            station.say(Level::Notice, text);
+        };
         let own = wish.campaign.join("analysis.json");
         let path = wish.law.as_ref().unwrap_or(&own);
         let reference = match calibration(path) {
             Ok(Some(reference)) => reference,
             Ok(None) if wish.law.is_none() => {
-                host.say(
+                tell(
                     "the page shows no air: the campaign has no analysed calibration (`updraft \
                      analyze`, or --law with another campaign's analysis.json)",
                 );
@@ -108,12 +115,15 @@ impl AirWatch {
                 )));
             }
             Err(error) if wish.law.is_none() => {
-                host.say(&format!("the page shows no air: {error}"));
+                tell(&format!("the page shows no air: {error}"));
                 return Ok(None);
             }
             Err(error) => return Err(error),
         };
         station.keep_air(MOTORS);
+        let note = format!("The first values come {FIRST_S:.0} s into the hover.");
+        let first = AirView { provisional: true, note, ..AirView::default() };
+        station.air(Some(first), BTreeMap::new());
         let shared = Arc::new(Shared {
             stop: AtomicBool::new(false),
             guard: Mutex::default(),
@@ -275,7 +285,7 @@ fn look_again(
             // Too little was heard yet, for example: the next look may have more.
             if let Some(map) = looked.ok().and_then(|flight| flight.map) {
                 let rate_hz = station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
-                let (view, of) = shown(&map, [from_s, show_s], rate_hz);
+                let (view, of) = shown(&map, from_s, rate_hz);
                 let look = Look { time_s: view.time_s, of: of.clone() };
                 shared.looks.lock().unwrap_or_else(PoisonError::into_inner).push(look);
                 station.air(Some(view), of);
@@ -287,15 +297,12 @@ fn look_again(
 }
 
 /// What of a map is shown: the latest values.
-fn shown(
-    map: &UpdraftMap,
-    [from_s, to_s]: [f64; 2],
-    rate_hz: f64,
-) -> (AirView, BTreeMap<u16, (f64, f64)>) {
+fn shown(map: &UpdraftMap, from_s: f64, rate_hz: f64) -> (AirView, BTreeMap<u16, (f64, f64)>) {
     let (latest_s, of) = of_map::latest(map);
     let latest_s = latest_s.unwrap_or(from_s);
     let posterior = map.posterior.as_ref();
     let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
+    let span_s = map.time_s.first().map_or(0.0, |first_s| latest_s - first_s);
     let view = AirView {
         provisional: true,
         time_s: latest_s,
@@ -303,8 +310,10 @@ fn shown(
         map: grid.and_then(|grid| of_map::maps(grid).next_back()).map(|(_, map)| map),
         note: format!(
             "From telemetry at {rate_hz:.1} Hz: the mean is over the last {:.0} s, the colours are 10 s means. \
-             The logs tell it again, and better.",
-            to_s - from_s
+             At this rate a drone's own mean is off by {:.2} m/s for want of messages. The logs tell it again, \
+             and better.",
+            span_s,
+            COST_MPS_HZ / rate_hz.max(0.1)
         ),
     };
     (view, of)

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use crate::live::station::Station;
-use crate::live::view::{Level, Step};
+use crate::live::view::Level;
 use crate::workflow::clock::{Clock, Micros};
 use crate::workflow::host::{Answer, Host, News, Progress, Transfer};
 
@@ -39,7 +39,7 @@ impl<'a> LiveHost<'a> {
 impl Drop for LiveHost<'_> {
     fn drop(&mut self) {
         if let Some(station) = &self.station {
-            station.step(Step::Over, "The station's work is done");
+            station.over();
         }
     }
 }

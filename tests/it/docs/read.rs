@@ -34,15 +34,15 @@ pub(crate) fn own_words(text: &str) -> Option<Vec<String>> {
         Some(at) if at == 0 || text[..at].ends_with(' ') => at,
         _ => {
             let run = text.strip_prefix("cargo run --release -- ")?;
-            return Some(with_placeholders(format!("updraft {run}")));
+            return Some(with_placeholders(&format!("updraft {run}")));
         }
     };
     let own = text[from..].split(['\'', ';']).next()?;
     let is_first = text[..from].split_whitespace().all(|word| word != "duckdb");
-    is_first.then(|| with_placeholders(if from == 0 { text.to_owned() } else { own.to_owned() }))
+    is_first.then(|| with_placeholders(if from == 0 { text } else { own }))
 }
 
-fn with_placeholders(text: String) -> Vec<String> {
+fn with_placeholders(text: &str) -> Vec<String> {
     let mut before = String::new();
     let replaced = |word: String| {
         let behind = BEHIND.iter().find(|(after, name, _)| *after == before && *name == word);
@@ -51,7 +51,7 @@ fn with_placeholders(text: String) -> Vec<String> {
         before.clone_from(&word);
         instance.map_or(word, str::to_owned)
     };
-    blocks::words(&text).into_iter().map(replaced).collect()
+    blocks::words(text).into_iter().map(replaced).collect()
 }
 
 /// Whether the program takes these words, with all values. `is_whole`: nothing may be missing.

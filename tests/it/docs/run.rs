@@ -40,7 +40,7 @@ fn with_options(mut words: Vec<String>, options: &[&str]) -> Vec<String> {
         let value = options.next_if(|word| !word.starts_with('-'));
         let at = words.iter().position(|word| word == option);
         match (at, value) {
-            (Some(at), Some(value)) => words[at + 1] = (*value).to_owned(),
+            (Some(at), Some(value)) => (*value).clone_into(&mut words[at + 1]),
             (Some(_), None) => {}
             (None, _) => {
                 words.push((*option).to_owned());

@@ -35,7 +35,10 @@ fn the_package_has_what_the_readme_shows_and_the_sources_embed() {
         let has = packed.contains(link) || packed.iter().any(|file| file.starts_with(&folder));
         assert!(has || link == "crates", "the README shows {link}, and the package has it not");
     }
-    for file in packed.iter().filter(|file| file.starts_with("src/") && file.ends_with(".rs")) {
+    for file in packed
+        .iter()
+        .filter(|file| file.starts_with("src/") && file.rsplit('.').next() == Some("rs"))
+    {
         let text = std::fs::read_to_string(root.join(file)).unwrap();
         for embedded in
             text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split('"').next())

@@ -30,10 +30,10 @@ fn the_air_of_telemetry_is_that_of_the_logs() {
     let mut flight = Flight::of(&bench, &[&fly[..], &page].concat());
     flight.hear("performing");
     flight.hear("have landed");
-    flight.hear("the page's air was");
+    flight.hear("The page's air was");
     assert_eq!(flight.end(), Some(0), "{}", flight.said());
     let said = flight.said();
-    let apart_mps = number(&said, "the page's air was ", "m/s too");
+    let apart_mps = number(&said, "The page's air was ", "m/s too");
     let stated_mps = number(&said, "(it stated +- ", "m/s)");
     let correlation = number(&said, ", correlation ", ", ");
     assert!(apart_mps < stated_mps, "{said}");

@@ -33,7 +33,7 @@ pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure
     let mut sheet = Sheet::new(PANEL[0], panels.len() as f64 * PANEL[1]);
     for (row, (quantity, title, unit)) in panels.iter().enumerate() {
         let top = row as f64 * PANEL[1];
-        let (panel, labels) = panel(law, *quantity, title, unit, top)?;
+        let (panel, labels) = panel(law, *quantity, title, unit, top);
         sheet.place(panel.draw(PANEL[0], PANEL[1]), 0.0, top);
         sheet.lay_over(labels);
     }
@@ -69,7 +69,7 @@ fn panel(
     title: &str,
     unit: &str,
     top: f64,
-) -> Option<(Panel, Drawing)> {
+) -> (Panel, Drawing) {
     let place = |index: usize, one: &DroneChange| one.slot.map_or(index as f64 + 1.0, f64::from);
     let known: Vec<(&DroneChange, Mark, bool)> = (law.drones.iter().enumerate())
         .filter_map(|(index, one)| {
@@ -111,5 +111,5 @@ fn panel(
         let label = one.slot.map_or_else(|| one.name.clone(), |slot| slot.to_string());
         labels.text(at, &label, style, 0.0);
     }
-    Some((panel, labels))
+    (panel, labels)
 }

@@ -18,6 +18,8 @@ const PANEL: [f64; 2] = [518.0, 380.0];
 /// Columns of a label in a legend.
 const LABEL: usize = 30;
 
+type Of = fn(&CurvePoint) -> Estimate;
+
 /// The laws; `None` where the ladders have no speeds in common.
 pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure> {
     if law.curve.is_empty() {
@@ -32,7 +34,6 @@ pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure
     let mut panel = Panel::new("(a) The laws", x.clone(), y);
     panel.legend_at(LegendPosition::InsideTopLeft);
     panel.clear_legend();
-    type Of = fn(&CurvePoint) -> Estimate;
     let sides: [(Of, _, &str); 2] = [
         (|point| point.reference, REFERENCE, &law.pair.reference),
         (|point| point.other, OTHER, &law.pair.other),

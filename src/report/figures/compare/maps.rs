@@ -19,6 +19,8 @@ const TEXT_LIMIT: usize = 150;
 /// Columns of a heading.
 const LABEL: usize = 34;
 
+type Of = fn(&PlaceChange) -> Estimate;
+
 /// The maps; `None` where their places differ.
 pub(in crate::report) fn figure(map: &MapComparison, key: &str) -> Option<Figure> {
     let places = &map.places.as_ref()?.places;
@@ -33,7 +35,6 @@ pub(in crate::report) fn figure(map: &MapComparison, key: &str) -> Option<Figure
     let of_change = limit(places.iter().map(|place| place.change.value));
     let mut drawing =
         Drawing::new(70.0 + 3.0 * shift + 110.0 + 100.0, TOP + height.max(200.0) + 58.0);
-    type Of = fn(&PlaceChange) -> Estimate;
     let maps: [(&Projection, Of, f64, String); 3] = [
         (&first, |place| place.reference, scale, shortened(&map.pair.reference, LABEL)),
         (&second, |place| place.other, scale, shortened(&map.pair.other, LABEL)),

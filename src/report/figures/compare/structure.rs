@@ -47,6 +47,9 @@ pub(in crate::report) fn figure(of: &StructureComparison, key: &str) -> Option<F
     })
 }
 
+type OfDistance = fn(&DistancePoint) -> Estimate;
+type OfLag = fn(&LagPoint) -> f64;
+
 fn axis(label: &str, values: impl Iterator<Item = f64>) -> Axis {
     let mut axis = Axis::around(label, values.chain([0.0, 1.0]), 1.0);
     (axis.min, axis.max) = (axis.min.max(-1.0), axis.max.min(1.0));
@@ -72,8 +75,7 @@ fn over_distance(of: &StructureComparison) -> Panel {
     let y = axis("correlation", reach);
     let mut panel = Panel::new("(a) Over distance", x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
-    type Of = fn(&DistancePoint) -> Estimate;
-    let sides: [(Of, _); 2] = [(|of| of.reference, REFERENCE), (|of| of.other, OTHER)];
+    let sides: [(OfDistance, _); 2] = [(|of| of.reference, REFERENCE), (|of| of.other, OTHER)];
     for (value, (colour, dash, shape)) in sides {
         let values = of.distance.iter().map(|point| (point.distance_m, value(point)));
         let line: Vec<_> = values.clone().map(|(x, of)| (x, of.value)).collect();
@@ -93,8 +95,7 @@ fn over_time(of: &StructureComparison) -> Panel {
     let y = axis("correlation", of.time.iter().flat_map(|point| [point.reference, point.other]));
     let mut panel = Panel::new("(b) Over time", x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
-    type Of = fn(&LagPoint) -> f64;
-    let sides: [(Of, _); 2] = [(|of| of.reference, REFERENCE), (|of| of.other, OTHER)];
+    let sides: [(OfLag, _); 2] = [(|of| of.reference, REFERENCE), (|of| of.other, OTHER)];
     for (value, (colour, dash, _)) in sides {
         let line: Vec<_> = of.time.iter().map(|point| (point.lag_s, value(point))).collect();
         panel.line(&line, colour, 2.0, dash);

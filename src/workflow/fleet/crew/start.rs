@@ -41,6 +41,12 @@ impl<'a> Crew<'a> {
         Ok(start)
     }
 
+    /// Refuses where too little time is left to authorize a start.
+    pub(crate) fn in_time(&self, start: &Start) -> Result<(), WorkflowError> {
+        let left = start.check_time(&self.telemetry, self.net.now());
+        left.map_err(|error| WorkflowError::Failed(error.to_string()))
+    }
+
     /// Authorizes a start that all have taken, and waits until all know.
     pub(crate) fn authorize(&mut self, start: &mut Start) -> Result<(), WorkflowError> {
         if let Err(ordered) = self.not_ordered_down() {
