@@ -33,7 +33,6 @@ use crate::link::id::DroneId;
 use crate::link::net::Received;
 use crate::mission::Plan;
 use crate::protocol::show::Stage;
-use crate::virtual_fleet::vehicle::REVISION;
 
 /// Sentences that are kept.
 const MOST_SAID: usize = 300;
@@ -156,12 +155,12 @@ impl Station {
         Some(now.monitor.slots().filter_map(flight).collect())
     }
 
-    /// Whether these are virtual drones of our own, by what they say of their firmware.
-    pub fn are_virtual(&self) -> bool {
+    /// Whether all drones that state a firmware state this revision of it, and one does.
+    pub fn are_of(&self, revision: [u8; 8]) -> bool {
         let now = self.lock();
         let version = |drone| now.monitor.telemetry.get(drone)?.version;
         let versions = now.monitor.slots().filter_map(|(drone, _)| version(drone));
-        versions.map(|version| version.revision == REVISION).reduce(|a, b| a && b) == Some(true)
+        versions.map(|version| version.revision == revision).reduce(|a, b| a && b) == Some(true)
     }
 
     /// Step of the station, and the time of the show, s.

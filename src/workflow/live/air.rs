@@ -24,6 +24,7 @@ use crate::mission::Plan;
 use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric;
 use crate::vehicle::library;
+use crate::virtual_fleet::vehicle::REVISION;
 use crate::workflow::analyze::Settings;
 use crate::workflow::analyze::one_input;
 use crate::workflow::clock::{Clock, Micros, S};
@@ -275,7 +276,7 @@ fn look_again(
                 ..LogInput::default()
             }
         });
-        let sag = if station.are_virtual() { of_virtual } else { found.sag };
+        let sag = if station.are_of(REVISION) { of_virtual } else { found.sag };
         let found = Found { logs: logs.collect(), sag, ..found.clone() };
         if !found.logs.is_empty() {
             let work = Work::default();

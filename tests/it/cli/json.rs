@@ -139,6 +139,7 @@ const FAILS: &[&[&str]] = &[
     &["analyze", "nothing"],
     &["analyze", "campaign"],
     &["archive", "nothing"],
+    &["compare", "nothing", "elsewhere"],
     &["archive", "campaign"],
     &["sweep", "nothing"],
     &["gap", "nothing"],

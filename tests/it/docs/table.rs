@@ -46,6 +46,7 @@ const MANY: &str = "hundreds of flights";
 const SLURM: &str = "needs Slurm: tests/it/cluster";
 const DRONES: &str = "needs drones: tests/it/cli/fleet.rs flies virtual ones";
 const GAME: &str = "searches for minutes in a debug build: .ci/run plays a game";
+const TWO: &str = "needs two analysed campaigns: tests/it/cli/compare.rs";
 const SERVES: &str = "serves until Ctrl-C";
 const PYTHON: &str = "a query in DuckDB or pandas: tests/it/archive runs those of docs/archive.md";
 const FIRMWARE: &str = "ArduPilot's own program";
@@ -91,6 +92,9 @@ pub(crate) const RULES: &[Rule] = &[
         ]),
     ),
     rule("README.md", "updraft gap my-campaign", Read(GAME)),
+    rule("README.md", "updraft compare", Read(TWO)),
+    rule("docs/compare.md", "updraft compare", Read(TWO)),
+    rule("docs/basemap.md", "updraft analyze", Read("needs a picture: tests/it/cli/basemap.rs")),
     rule("README.md", "updraft inspect FILE", Instead("FILE", "my-campaign/show.skyc")),
     rule("README.md", "updraft fly my-campaign", With(&["--dry-run"])),
     rule("README.md", "updraft logs pull", With(&["--dry-run"])),

@@ -19,7 +19,7 @@ fn the_air_of_telemetry_is_that_of_the_logs() {
         let plan = ["plan", "campaign", "--grid", "3x3", "--duration", "150", "-o", folder];
         bench.expect(0, &plan);
     }
-    bench.expect(0, &["simulate", "campaign", "--flight", "calibration", "--air", "calm"]);
+    bench.expect(0, &["simulate", "campaign", "--flight", "calibration", "--air", "still"]);
     bench.expect(0, &["analyze", "campaign"]);
     let (station, live) = (free_port().to_string(), free_port().to_string());
     let air = ["--air", "field:sd=0.5,lambda=145,tau=120", "--seed", "5", "--speed", "3"];

@@ -75,6 +75,16 @@ fn a_flight_is_started_and_ended_on_its_page() {
     tab.wait_for("document.querySelectorAll('#rows tr').length === 2");
     tab.screenshot(&pictures().join("flying.png"));
 
+    // Only the one that is chosen lands.
+    tab.click_on("#rows input[aria-label='slot 2']");
+    tab.click_on("#order-land");
+    tab.wait_for("!document.getElementById('confirm').hidden");
+    tab.click_on("#confirm-yes");
+    flight.hear("Ordered on the page: land");
+    tab.wait_for("state.drones[1].order.startsWith('land: ')");
+    assert_eq!(tab.text("state.drones[0].order"), "", "it was not chosen");
+    tab.click_on("#choose-none");
+
     // A second, deliberate step brings them down; Escape takes the first one back.
     tab.press_on("#order-land", Key::Enter);
     tab.wait_for("!document.getElementById('confirm').hidden");
@@ -89,16 +99,21 @@ fn a_flight_is_started_and_ended_on_its_page() {
     tab.click_on("#order-return");
     tab.wait_for("!document.getElementById('confirm').hidden");
     tab.screenshot(&pictures().join("confirm.png"));
-    assert!(!flight.said().contains("Ordered"), "nothing is ordered yet");
+    assert!(!flight.said().contains("page: abort"), "nothing is ordered yet");
     tab.press(Key::Tab);
     assert_eq!(tab.text("document.activeElement.id"), "confirm-yes");
     tab.press(Key::Enter);
     flight.hear("Ordered on the page: abort");
-    tab.wait_for("state.drones.every((d) => d.order === 'return: returns')");
+    tab.wait_for("state.drones[0].order === 'return: returns'");
     tab.dark();
     tab.screenshot(&pictures().join("ordered-dark.png"));
-    tab.finish();
+    let troubles = tab.troubles();
+    assert!(troubles.is_empty(), "{troubles:#?}");
     assert_eq!(flight.end(), Some(3), "{}", flight.said());
+    // The page is told that it is over, and that is no loss of the connection.
+    tab.wait_for("state.frame.step === 'over'");
+    tab.wait_for("document.getElementById('connection').textContent === 'station ended'");
+    drop(tab);
     let journal = fs::read_to_string(bench.path("campaign/fleet-journal.ndjson")).unwrap();
     assert!(journal.contains("ordered on the page"), "{journal}");
 }

@@ -150,7 +150,7 @@ fn secrets_decide_who_looks_and_who_orders() {
     let what = wish(address, &format!("{own}X-Token: order\r\n"), r#"{"wish": "fall"}"#);
     assert!(what.starts_with("HTTP/1.1 400 ") && what.contains("unknown variant"), "{what}");
     let long = format!("{own}X-Token: order\r\n");
-    assert!(wish(address, &long, &"x".repeat(5000)).starts_with("HTTP/1.1 413 "));
+    assert!(wish(address, &long, &"x".repeat(20_000)).starts_with("HTTP/1.1 413 "));
 }
 
 #[test]
