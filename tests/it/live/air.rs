@@ -13,22 +13,24 @@ fn number(said: &str, before: &str, after: &str) -> f64 {
 }
 
 #[test]
+#[ignore = "takes minutes: cargo test --release --test it -- --ignored live::air"]
 fn the_air_of_telemetry_is_that_of_the_logs() {
     let bench = Bench::new();
     for folder in ["campaign", "drones"] {
-        let plan = ["plan", "campaign", "--grid", "3x3", "--duration", "150", "-o", folder];
+        let plan = ["plan", "campaign", "--grid", "4x4", "--duration", "150", "-o", folder];
         bench.expect(0, &plan);
     }
     bench.expect(0, &["simulate", "campaign", "--flight", "calibration", "--air", "still"]);
     bench.expect(0, &["analyze", "campaign"]);
     let (station, live) = (free_port().to_string(), free_port().to_string());
-    let air = ["--air", "field:sd=0.5,lambda=145,tau=120", "--seed", "5", "--speed", "3"];
+    let air = ["--air", "field:sd=0.5,lambda=145,tau=120", "--seed", "5", "--speed", "2"];
     let _fleet = bench.fleet(&station, &[&["--flight", "hover"][..], &air].concat());
     let link = format!("udpin:{station}");
     let fly = ["fly", "campaign", "--flight", "hover", "--connect", &link, "--set-params", "--yes"];
     let page = ["--lead", "30", "--wait", "20", "--live", &live];
     let mut flight = Flight::of(&bench, &[&fly[..], &page].concat());
     flight.hear("performing");
+    std::thread::sleep(std::time::Duration::from_secs(60));
     flight.hear("have landed");
     flight.hear("The page's air was");
     assert_eq!(flight.end(), Some(0), "{}", flight.said());
