@@ -30,7 +30,7 @@ fn the_air_of_telemetry_is_that_of_the_logs() {
     let page = ["--lead", "30", "--wait", "20", "--live", &live];
     let mut flight = Flight::of(&bench, &[&fly[..], &page].concat());
     flight.hear("performing");
-    std::thread::sleep(std::time::Duration::from_secs(60));
+    std::thread::sleep(std::time::Duration::from_mins(1));
     flight.hear("have landed");
     flight.hear("The page's air was");
     assert_eq!(flight.end(), Some(0), "{}", flight.said());
