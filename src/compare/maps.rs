@@ -12,7 +12,7 @@ use super::side::Couple;
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 use crate::analysis::statistics::result::{FieldStatistics, Interval, Scale};
 use crate::base::estimate::Estimate;
-use crate::numeric::mean;
+use crate::numeric::{Line, mean};
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.959963984540054;
@@ -243,12 +243,8 @@ fn pattern(places: &[PlaceChange]) -> Option<(f64, usize)> {
 }
 
 fn pearson(values: &[[f64; 2]]) -> Option<f64> {
-    let [a, b] = [0, 1].map(|of| mean(values.iter().map(|value| value[of])));
-    let (a, b) = (a?, b?);
-    let sum = |of: &dyn Fn(&[f64; 2]) -> f64| values.iter().map(of).sum::<f64>();
-    let (aa, bb) = (sum(&|v| (v[0] - a).powi(2)), sum(&|v| (v[1] - b).powi(2)));
-    let ab = sum(&|v| (v[0] - a) * (v[1] - b));
-    (aa > 0.0 && bb > 0.0).then(|| (ab / (aa * bb).sqrt()).clamp(-1.0, 1.0))
+    let line = Line::through(values.iter().map(|[a, b]| (*a, *b)))?;
+    Some(line.correlation()?.clamp(-1.0, 1.0))
 }
 
 /// Length of the air's correlation, m: of the posterior's scales, else of maximum likelihood.

@@ -3,10 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use crate::numeric;
-
-/// Half the width of the 95 % interval, standard errors.
-const WIDTH: f64 = 1.96;
+use super::of_map::WIDTH;
+use crate::numeric::{self, Line};
 
 /// What a page has shown once.
 #[derive(Clone, Debug)]
@@ -49,24 +47,13 @@ impl Agreement {
             pairs.iter().filter(|(shown, error, logged)| (shown - logged).abs() <= WIDTH * error);
         Some(Self {
             values: pairs.len(),
-            correlation: correlation(&pairs),
+            correlation: Line::through(pairs.iter().map(|(shown, _, logged)| (*shown, *logged)))
+                .and_then(|line| line.correlation()),
             bias_mps: numeric::mean(apart())?,
             stated_mps: WIDTH * numeric::mean(pairs.iter().map(|(_, error, _)| *error))?,
             inside: within.count() as f64 / pairs.len() as f64,
         })
     }
-}
-
-fn correlation(pairs: &[(f64, f64, f64)]) -> Option<f64> {
-    let shown = numeric::mean(pairs.iter().map(|(shown, ..)| *shown))?;
-    let logged = numeric::mean(pairs.iter().map(|(.., logged)| *logged))?;
-    let mut sums = [0.0; 3];
-    for (a, _, b) in pairs {
-        let (a, b) = (a - shown, b - logged);
-        sums = [sums[0] + a * a, sums[1] + a * b, sums[2] + b * b];
-    }
-    let correlation = sums[1] / (sums[0] * sums[2]).sqrt();
-    correlation.is_finite().then_some(correlation)
 }
 
 impl fmt::Display for Agreement {
@@ -85,6 +72,7 @@ impl fmt::Display for Agreement {
 #[cfg(test)]
 mod tests {
     use super::*;
+
     fn look(time_s: f64, of: [f64; 2]) -> Look {
         let of = of.into_iter().zip(1..).map(|(value, slot)| (slot, (value, 0.1)));
         Look { time_s, of: of.collect() }

@@ -297,27 +297,18 @@ fn look_again(
     }
 }
 
-/// What of a map is shown: the latest values.
+/// What of telemetry's map is shown, and what it lacks.
 fn shown(map: &UpdraftMap, from_s: f64, rate_hz: f64) -> (AirView, BTreeMap<u16, (f64, f64)>) {
     let (latest_s, of) = of_map::latest(map);
     let latest_s = latest_s.unwrap_or(from_s);
-    let posterior = map.posterior.as_ref();
-    let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
     let span_s = map.time_s.first().map_or(0.0, |first_s| latest_s - first_s);
-    let view = AirView {
-        provisional: true,
-        time_s: latest_s,
-        fleet_mps: posterior.and_then(|posterior| posterior.fleet).map(of_map::interval_mps),
-        map: grid.and_then(|grid| of_map::maps(grid).next_back()).map(|(_, map)| map),
-        note: format!(
-            "From telemetry at {rate_hz:.1} Hz: the mean is over the last {:.0} s, the colours are 10 s means. \
-             At this rate a drone's own mean is off by {:.2} m/s for want of messages. The logs tell it again, \
-             and better.",
-            span_s,
-            COST_MPS_HZ / rate_hz.max(0.1)
-        ),
-    };
-    (view, of)
+    let cost_mps = COST_MPS_HZ / rate_hz.max(0.1);
+    let note = format!(
+        "From telemetry at {rate_hz:.1} Hz: the mean is over the last {span_s:.0} s, the colours are 10 s means. \
+         At this rate a drone's own mean is off by {cost_mps:.2} m/s for want of messages. The logs tell it again, \
+         and better."
+    );
+    (latest_view(map, latest_s, true, note), of)
 }
 
 /// What of the logs' map is shown: the end of the hover, and how far the page was from it.
@@ -326,20 +317,24 @@ fn final_view(
     agreement: Option<&Agreement>,
 ) -> (AirView, BTreeMap<u16, (f64, f64)>) {
     let (latest_s, of) = of_map::latest(map);
-    let posterior = map.posterior.as_ref();
-    let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
     let mut note =
         "From the logs: the mean is over the whole hover, the colours are of its last seconds."
             .to_owned();
     if let Some(agreement) = agreement {
         note = format!("{note} {agreement}.");
     }
-    let view = AirView {
-        provisional: false,
-        time_s: latest_s.unwrap_or_default(),
+    (latest_view(map, latest_s.unwrap_or_default(), false, note), of)
+}
+
+/// Mean of a map, and what is known between the drones at its end.
+fn latest_view(map: &UpdraftMap, time_s: f64, provisional: bool, note: String) -> AirView {
+    let posterior = map.posterior.as_ref();
+    let grid = posterior.and_then(|posterior| posterior.grid.as_ref());
+    AirView {
+        provisional,
+        time_s,
         fleet_mps: posterior.and_then(|posterior| posterior.fleet).map(of_map::interval_mps),
         map: grid.and_then(|grid| of_map::maps(grid).next_back()).map(|(_, map)| map),
         note,
-    };
-    (view, of)
+    }
 }

@@ -8,7 +8,7 @@ use crate::live::facts::centi;
 use crate::live::view::AirMap;
 
 /// Half the width of the 95 % interval, standard errors.
-const WIDTH: f64 = 1.96;
+pub(super) const WIDTH: f64 = 1.96;
 /// Times that are one second of the map, s.
 const SAME_S: f64 = 0.5;
 

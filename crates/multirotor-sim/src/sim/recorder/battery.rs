@@ -81,9 +81,14 @@ impl Battery {
         self.own.map_or(RESISTANCE_OHM, |own| own.resistance_ohm)
     }
 
+    /// Charge of a full battery, As.
+    fn capacity_as(&self) -> f64 {
+        self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0)
+    }
+
     /// State of the battery as the log has it.
     pub(super) fn reading(&self) -> Reading {
-        let capacity_as = self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0);
+        let capacity_as = self.capacity_as();
         Reading {
             volts: self.volts(),
             resting_v: self.resting_volts(),
@@ -98,7 +103,7 @@ impl Battery {
 
     /// Charge left, percent.
     pub(super) fn remaining_percent(&self) -> f64 {
-        let capacity_as = self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0);
+        let capacity_as = self.capacity_as();
         (100.0 * (1.0 - self.used_as / capacity_as)).clamp(0.0, 100.0)
     }
 }
