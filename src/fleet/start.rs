@@ -386,9 +386,13 @@ impl Start {
     /// The packet to broadcast, if it is due: once a second of the vehicles' time, and never after
     /// the start, when a start time would be taken for next week's.
     pub fn due(&mut self, telemetry: &Telemetry, now: Micros) -> Option<MavMessage> {
-        let over = self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
-        let silent = over || self.attached;
-        if now < self.next || (silent && self.phase != StartPhase::Cancelled) {
+        if now < self.next {
+            return None;
+        }
+        let over = || self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
+        if self.phase != StartPhase::Cancelled && (self.attached || over()) {
+            // Nothing more is sent, unless it is taken back.
+            self.next = now + S;
             return None;
         }
         self.next = now + (S as f64 / self.rate(telemetry).max(1.0)) as Micros;

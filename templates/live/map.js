@@ -78,11 +78,17 @@ function round(most) {
   return [5, 2, 1].map((k) => k * power).find((length) => length <= most) ?? power;
 }
 
+/** Limit of the colours that are shown, m/s. */
+let shownLimit = 0;
+
 function largest() {
   const values = state.drones.map((drone) => drone.air_mps).filter((value) => value !== null).map(Math.abs);
   for (const value of state.air?.map?.values_mps ?? []) if (value !== null) values.push(Math.abs(value));
   const most = Math.max(0.25, ...values);
-  return [0.25, 0.5, 1, 2, 3, 5, 8, 12].find((round) => round >= most) ?? most;
+  const limit = [0.25, 0.5, 1, 2, 3, 5, 8, 12].find((round) => round >= most) ?? most;
+  // Colours keep their meaning while the air stays near the limit: up at once, down when half would do.
+  if (limit > shownLimit || most < shownLimit / 2) shownLimit = limit;
+  return shownLimit;
 }
 
 const LEVEL_COLOURS = { good: "--drone", notice: "--notice", warning: "--warning", alarm: "--alarm" };

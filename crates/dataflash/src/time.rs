@@ -6,7 +6,9 @@
 //! only conversions from and to Unix time are, GPS times among themselves never.
 
 use std::fmt;
+use std::sync::LazyLock;
 
+use hifitime::leap_seconds::LatestLeapSeconds;
 use hifitime::{Duration, Epoch, Unit};
 
 #[cfg(feature = "schemars")]
@@ -32,6 +34,15 @@ pub struct GpsTime {
     pub tow_ms: u32,
 }
 
+/// Unix time from which on the last known leap second is over, ms, and what GPS time is ahead of Unix time from then on,
+/// ms. Nearly all times that are converted are later, and thousands of drones' clocks are read every second.
+static LAST_LEAP: LazyLock<(i64, i64)> = LazyLock::new(|| {
+    let last_s = LatestLeapSeconds::default().next_back().map_or(0.0, |last| last.timestamp_tai_s);
+    let at = Epoch::from_tai_seconds(last_s).to_unix_duration() + Unit::Day * 1;
+    let ahead = Epoch::from_unix_duration(at).to_gpst_duration() - at;
+    (ms(at), ms(ahead))
+});
+
 impl GpsTime {
     /// Milliseconds since the GPS epoch.
     pub fn total_ms(self) -> i64 {
@@ -48,6 +59,10 @@ impl GpsTime {
     /// GPS time from Unix time in milliseconds, with the leap seconds of its date; `None`
     /// outside weeks 0 to 65535. No Unix time stands for the instants of a leap second itself.
     pub fn from_unix_ms(unix_ms: i64) -> Option<Self> {
+        let (since_ms, ahead_ms) = *LAST_LEAP;
+        if unix_ms >= since_ms {
+            return Self::from_total_ms(unix_ms.checked_add(ahead_ms)?);
+        }
         Self::from_total_ms(ms(
             Epoch::from_unix_duration(Unit::Millisecond * unix_ms).to_gpst_duration()
         ))
@@ -55,6 +70,11 @@ impl GpsTime {
 
     /// Unix time in milliseconds, with the leap seconds of its date.
     pub fn to_unix_ms(self) -> i64 {
+        let (since_ms, ahead_ms) = *LAST_LEAP;
+        let unix_ms = self.total_ms() - ahead_ms;
+        if unix_ms >= since_ms {
+            return unix_ms;
+        }
         let unix =
             Epoch::from_gpst_duration(Unit::Millisecond * self.total_ms()).to_unix_duration();
         let unix_ms = ms(unix);

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 const MOST: usize = 20;
 
 /// All of these names: `Drone 3`, `Drone 1 and Drone 2`, `drones 1-12, 14 and 16`, `A, B and C`. Names that are the
-/// same but for a number at their end are told by ranges of these; names of another kind one by one, and beyond the
-/// twentieth by their number.
+/// same but for a number at their end are told by ranges of these (`1:1-250, 2:1-250`); names of another kind one by
+/// one, and beyond the twentieth by their number.
 ///
 /// ```
 /// use untrusted_io::names::listed;
@@ -18,6 +18,9 @@ const MOST: usize = 20;
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let mut names: Vec<&str> = names.into_iter().collect();
     let Some(numbered) = numbered(&names) else {
+        if let Some(several) = several_stems(&names) {
+            return several;
+        }
         let mut seen = std::collections::BTreeSet::new();
         names.retain(|name| seen.insert(*name));
         return joined(names.iter().map(|name| (*name).to_owned()).collect(), names.len());
@@ -135,6 +138,24 @@ fn lowered(noun: &str) -> String {
     if rest_is_low { noun.to_lowercase() } else { noun.to_owned() }
 }
 
+/// Many names that all end in numbers after a few stems, by ranges for each stem; `None`: of another kind.
+fn several_stems(names: &[&str]) -> Option<String> {
+    let mut of_stem = std::collections::BTreeMap::<&str, Vec<u64>>::new();
+    for name in names {
+        let (stem, numbers) = numbered(&[*name])?;
+        of_stem.entry(stem).or_default().extend(numbers);
+    }
+    if of_stem.len() > MOST || names.len() < 3 * of_stem.len() {
+        return None;
+    }
+    let parts = of_stem.into_iter().map(|(stem, mut numbers)| {
+        numbers.sort_unstable();
+        numbers.dedup();
+        format!("{stem}{}", ranges(&numbers))
+    });
+    Some(parts.collect::<Vec<_>>().join(", "))
+}
+
 /// What comes before the number in all of these names, and the numbers; `None` where names are of another kind.
 fn numbered<'a>(names: &[&'a str]) -> Option<(&'a str, Vec<u64>)> {
     let split = |name: &'a str| {
@@ -166,6 +187,8 @@ mod tests {
         assert_eq!(listed(["x7", "x8", "x9"]), "x7-9");
         assert_eq!(listed(["3", "4", "5"]), "3-5");
         assert_eq!(listed(["UAV 3", "UAV 4", "UAV 5"]), "UAVs 3-5");
+        let networks = ["1:1", "1:2", "1:3", "1:7", "2:9", "2:10", "2:11", "2:12"];
+        assert_eq!(listed(networks), "1:1-3 and 7, 2:9-12");
     }
 
     #[test]

@@ -25,6 +25,7 @@ pub use self::protection::Protection;
 use self::state::Seen;
 pub use self::state::State;
 use super::messages::text;
+use crate::base::names::listed;
 use crate::link::clock::Micros;
 use crate::link::error::{NetError, Refusal};
 use crate::link::frame::MavMessage;
@@ -171,13 +172,17 @@ impl<'a> Gate<'a> {
         allowed: impl Fn(State) -> bool,
     ) -> Option<Why> {
         let now = self.net.now();
-        let mut words = Vec::new();
+        let mut words: Vec<(String, Vec<DroneId>)> = Vec::new();
         let mut for_now = true;
         for drone in drones {
             let seen = self.seen.get(&drone).copied().unwrap_or_default();
             let state = seen.state(now);
             if !allowed(state) {
-                words.push(format!("drone {drone} {}", seen.words(now)));
+                let said = seen.words(now);
+                match words.iter_mut().find(|(known, _)| *known == said) {
+                    Some((_, drones)) => drones.push(drone),
+                    None => words.push((said, vec![drone])),
+                }
                 // Disarmed: it was sent too soon.
                 for_now &= match state {
                     State::Unheard => seen.was_heard(),
@@ -186,8 +191,27 @@ impl<'a> Gate<'a> {
                 };
             }
         }
+        let together = |(said, drones): &(String, Vec<DroneId>)| subject(drones, said);
+        let words: Vec<String> = words.iter().map(together).collect();
         (!words.is_empty()).then(|| Why { words: words.join(", "), for_now })
     }
+}
+
+/// A sentence of which these drones are the subject; `said` follows the name of one.
+fn subject(drones: &[DroneId], said: &str) -> String {
+    if let [drone] = drones {
+        return format!("drone {drone} {said}");
+    }
+    let names: Vec<String> = drones.iter().map(ToString::to_string).collect();
+    let names = listed(names.iter().map(String::as_str));
+    let (verb, rest) = said.split_once(' ').unwrap_or((said, ""));
+    let verb = match verb {
+        "is" => "are",
+        "has" => "have",
+        "was" => "were",
+        other => other,
+    };
+    format!("drones {names} {verb} {rest}")
 }
 
 impl Net for Gate<'_> {

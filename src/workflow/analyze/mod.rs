@@ -234,12 +234,19 @@ impl Analysed {
     }
 
     /// Writes numbers and report into a folder. Returns the path of the page; `None` if the page
-    /// says that nothing was found.
+    /// says that nothing was found, or is not written because an earlier one says more.
     ///
     /// # Errors
     ///
     /// If they cannot be made or written.
     pub fn write(&self, host: &dyn Host, folder: &Path) -> Result<Option<PathBuf>, WorkflowError> {
+        if self.is_nothing() && holds_results(folder) {
+            host.warn(&format!(
+                "{} is that of an earlier analysis, which had results: it and its report are left as they are",
+                numbers_path(folder).shown()
+            ));
+            return Ok(None);
+        }
         let study = read_study(host, &self.root);
         let report_folder = folder.join("report");
         // The page tells the hash of the numbers, which come first; the tables are written beside it.
@@ -299,9 +306,20 @@ impl Analysed {
     }
 }
 
+/// File of all numbers.
+fn numbers_path(folder: &Path) -> PathBuf {
+    folder.join("analysis.json")
+}
+
+/// Whether a folder holds an analysis with a law or a value of the air.
+fn holds_results(folder: &Path) -> bool {
+    let earlier = campaign::read_json::<Analysis>(&numbers_path(folder));
+    earlier.is_ok_and(|earlier| earlier.what_was_found() != Yield::Nothing)
+}
+
 /// All numbers; the path of their file.
 fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<PathBuf, WorkflowError> {
-    let path = folder.join("analysis.json");
+    let path = numbers_path(folder);
     // Streamed: that of a thousand drones has a hundred megabytes.
     write_with(&path, |out| write_json(out, analysis))?;
     Ok(path)

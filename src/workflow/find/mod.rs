@@ -30,6 +30,7 @@ use crate::analysis::wind_forms::WindForms;
 use crate::analysis::{Level, LogInput, TruthSeries};
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
+use crate::base::names;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::origin::{self, LogOrigin};
@@ -133,6 +134,7 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
         let origin = work.origin.unwrap_or_else(|| origin::default_of(&folders));
         work.origin = Some(origin);
         work.used.extend(used(&folders, origin));
+        work.used.extend(simulated_alone(&folders, origin));
         let several = folders.len() > 1;
         let mut first_error = None;
         let before = work.flights.len();
@@ -279,6 +281,25 @@ pub fn level_tables(
         });
     }
     Ok(())
+}
+
+/// Flights that were simulated beside others that were flown: they give no laws by themselves.
+fn simulated_alone(folders: &[FlightFolder], origin: LogOrigin) -> Option<String> {
+    if origin != LogOrigin::Real || !folders.iter().any(FlightFolder::has_real_logs) {
+        return None;
+    }
+    let alone = folders.iter().filter(|of| !of.has_real_logs() && of.has_simulated_logs());
+    let names: Vec<String> = alone.map(|folder| stem(&folder.0)).collect();
+    let (has, them) = match names.len() {
+        0 => return None,
+        1 => ("has", "it"),
+        _ => ("have", "them"),
+    };
+    Some(format!(
+        "{} {has} simulated logs alone; laws that were simulated are used on purpose only: analyse {them} with --logs \
+         simulated -o FOLDER, then this campaign with --hold FOLDER/analysis.json",
+        names::listed(names.iter().map(String::as_str))
+    ))
 }
 
 /// Which logs are taken, where there are any.

@@ -15,6 +15,7 @@ use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::analysis::{AtHand, LogInput, analyze_flight};
 use crate::base::causes::with_causes;
+use crate::base::estimate::Estimate;
 use crate::base::plain::Shown as _;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::{FlightFolder, read_json};
@@ -43,6 +44,10 @@ const SHARE: u32 = 19;
 /// Error of a drone's mean over 10 s by messages that are too few, times their rate, m/s Hz: measured with logs that
 /// were thinned (`examples/thinned_telemetry.rs`).
 const COST_MPS_HZ: f64 = 0.11;
+/// The same of the fleet's mean, in shares of a drone's: drones do not err alike.
+const COST_OF_FLEET: f64 = 0.37;
+/// The rate of messages is that of so many last seconds, s.
+const RATE_OVER_S: f64 = 20.0;
 /// Motors of a vehicle, on its first outputs: all that updraft knows have four.
 const MOTORS: usize = 4;
 
@@ -266,6 +271,10 @@ fn look_again(
         let begun = clock.now();
         let from_s = (show_s - WINDOW_S).max(begins_s);
         let flights = station.flights(from_s).unwrap_or_default();
+        let rates_hz: BTreeMap<u16, f64> = flights
+            .iter()
+            .map(|(slot, flight)| (*slot, rate_hz(&flight.effort.values.time_s, show_s)))
+            .collect();
         let logs = flights.into_iter().map(|(slot, mut flight)| {
             // No message has it, and packs keep theirs.
             flight.resistance_ohm = resistance_ohm(reference, slot);
@@ -285,8 +294,7 @@ fn look_again(
                 .install(|| analyze_flight(&input, &settings.options, Some(reference), &|_, _| {}));
             // Too little was heard yet, for example: the next look may have more.
             if let Some(map) = looked.ok().and_then(|flight| flight.map) {
-                let rate_hz = station.stream_every().map_or(0.0, |every| S as f64 / every as f64);
-                let (view, of) = shown(&map, from_s, rate_hz);
+                let (view, of) = shown(&map, from_s, &rates_hz);
                 let look = Look { time_s: view.time_s, of: of.clone() };
                 shared.looks.lock().unwrap_or_else(PoisonError::into_inner).push(look);
                 station.air(Some(view), of);
@@ -297,18 +305,45 @@ fn look_again(
     }
 }
 
-/// What of telemetry's map is shown, and what it lacks.
-fn shown(map: &UpdraftMap, from_s: f64, rate_hz: f64) -> (AirView, BTreeMap<u16, (f64, f64)>) {
-    let (latest_s, of) = of_map::latest(map);
+/// Messages a second of these times, over the last seconds before `now_s`.
+fn rate_hz(times_s: &[f64], now_s: f64) -> f64 {
+    let recent = times_s.iter().filter(|time_s| **time_s > now_s - RATE_OVER_S).count();
+    recent as f64 / RATE_OVER_S
+}
+
+/// Standard error that messages at this rate add to a drone's mean over 10 s, m/s: on a link that loses, or of drones whose
+/// time runs faster, fewer come than were asked for.
+fn cost_mps(rate_hz: f64) -> f64 {
+    COST_MPS_HZ / rate_hz.max(0.1)
+}
+
+/// What of telemetry's map is shown, and what it lacks, by the rates at which slots are heard, Hz.
+fn shown(
+    map: &UpdraftMap,
+    from_s: f64,
+    rates_hz: &BTreeMap<u16, f64>,
+) -> (AirView, BTreeMap<u16, (f64, f64)>) {
+    let (latest_s, mut of) = of_map::latest(map);
     let latest_s = latest_s.unwrap_or(from_s);
     let span_s = map.time_s.first().map_or(0.0, |first_s| latest_s - first_s);
-    let cost_mps = COST_MPS_HZ / rate_hz.max(0.1);
+    let rate_hz = numeric::median(rates_hz.values().copied().collect()).unwrap_or_default();
+    for (slot, (_, error)) in &mut of {
+        let rate_hz = rates_hz.get(slot).copied().unwrap_or_default();
+        *error = error.hypot(cost_mps(rate_hz));
+    }
+    let cost_mps = cost_mps(rate_hz);
     let note = format!(
         "From telemetry at {rate_hz:.1} Hz: the mean is over the last {span_s:.0} s, the colours are 10 s means. \
          At this rate a drone's own mean is off by {cost_mps:.2} m/s for want of messages. The logs tell it again, \
          and better."
     );
-    (latest_view(map, latest_s, true, note), of)
+    let mut view = latest_view(map, latest_s, true, note);
+    let fleet = map.posterior.as_ref().and_then(|posterior| posterior.fleet);
+    view.fleet_mps = fleet.map(|fleet| {
+        let se = fleet.se.hypot(COST_OF_FLEET * cost_mps);
+        of_map::interval_mps(Estimate { se, ..fleet })
+    });
+    (view, of)
 }
 
 /// What of the logs' map is shown: the end of the hover, and how far the page was from it.

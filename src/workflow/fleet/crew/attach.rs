@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Crew;
+use super::start::TAKEN_TOGETHER;
+use crate::base::names::listed;
 use crate::base::time::{GpsTime, WEEK_S};
 use crate::campaign::start::StartRecord;
 use crate::fleet::gate::State;
@@ -82,7 +84,8 @@ impl Crew<'_> {
             open.retain(|drone| has_start(self, drone));
         }
         let names = |drones: &BTreeSet<DroneId>| {
-            drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+            let drones: Vec<String> = drones.iter().map(ToString::to_string).collect();
+            listed(drones.iter().map(String::as_str))
         };
         if open.is_empty() {
             self.host.say(&format!(
@@ -115,8 +118,13 @@ impl Crew<'_> {
             && self.net.in_the_air(self.drones(), false).is_empty()
         {
             self.host.check_stop()?;
-            if let Some(received) = self.net.recv(self.net.now() + 100 * MS)? {
-                self.telemetry.on_message(self.net.now(), &received);
+            let (mut wait, until) = (self.net.now() + 100 * MS, self.net.now() + TAKEN_TOGETHER);
+            while let Some(received) = self.net.recv(wait)? {
+                wait = self.net.now();
+                self.telemetry.on_message(wait, &received);
+                if wait >= until {
+                    break;
+                }
             }
         }
         Ok(())
