@@ -1,4 +1,4 @@
-//! `updraft live`: a flight in a browser, from its logs.
+//! `updraft live`: a flight in a browser, from its logs and its journal.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,6 +11,7 @@ use super::live_args::random;
 use crate::campaign::origin::LogOrigin;
 use crate::live::player::SPEEDS;
 use crate::workflow::live::{Address, LiveWish, ReplayWish, replay};
+use crate::workflow::words::count;
 
 /// How often Ctrl-C is looked for.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -23,12 +24,13 @@ const PAUSE: Duration = Duration::from_millis(100);
   updraft live my-campaign --listen 192.168.1.7:8700   # for others in the network
 
 The page has a slider for the time, a choice of speeds, the board and the map as they were in flight,
-and the air as it was analysed, if the campaign was (`updraft analyze`). It is served until Ctrl-C.
+what the station said then (fleet-journal.ndjson), and the air as it was analysed, if the campaign was
+(`updraft analyze`). Without logs there is the journal alone. It is served until Ctrl-C.
 A flight that is in the air is shown by `updraft fly --live` or `updraft fleet watch --live`.")]
 pub(super) struct LiveCommandArgs {
     /// Campaign folder
     campaign: PathBuf,
-    /// Which flight to show [default: the last that has logs]
+    /// Which flight to show [default: the last that has logs or, without any, a journal]
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
     /// Show the simulated logs, although there are some of real drones
@@ -60,11 +62,16 @@ pub(super) fn run(context: &Context, args: &LiveCommandArgs) -> Result<Exit, Com
     };
     let live = LiveWish { address: args.listen, orders: false, random };
     let replayed = replay(context, &wish, &live)?;
-    context.say(&format!(
-        "Replay of {} with {}; Ctrl-C ends it",
-        replayed.flight,
-        crate::workflow::words::count(replayed.drones, "drone")
-    ));
+    let drones = match replayed.drones {
+        (logged, 0) => count(logged, "drone"),
+        (0, told) => {
+            format!("{}, by the journal alone: where they were only logs say", count(told, "drone"))
+        }
+        (logged, told) => {
+            format!("{}, and {told} more by the journal alone", count(logged, "drone"))
+        }
+    };
+    context.say(&format!("Replay of {} with {drones}; Ctrl-C ends it", replayed.flight));
     while !context.host().is_stopped() {
         std::thread::sleep(PAUSE);
     }

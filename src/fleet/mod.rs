@@ -21,6 +21,7 @@ pub mod orders;
 pub mod preflight;
 #[cfg(test)]
 mod preflight_tests;
+pub mod recorded;
 pub mod required;
 pub mod slots;
 pub mod start;

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::messages::mode_name;
 use super::off_course::{Change, Course, Moment};
@@ -44,7 +44,7 @@ impl Limits {
 }
 
 /// Event in the flight of one drone.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// The drone has entered another stage of the show.

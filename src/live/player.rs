@@ -19,6 +19,9 @@ const FAR_M: f64 = 3.0;
 /// A map is shown at times no further from its own, s.
 const MAP_S: f64 = 10.0;
 
+/// Trouble of a drone that was not logged.
+const NO_LOG: &str = "its log is not here";
+
 /// One drone of a replay, on an even grid of times.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
@@ -38,6 +41,8 @@ pub struct Track {
     pub stages: Vec<(f64, u8)>,
     /// Stretches in which the motors were armed, s.
     pub armed_s: Vec<(f64, f64)>,
+    /// Words of the station about the drone, by the time at which they were said, s.
+    pub words: Vec<(f64, String)>,
     /// Doubts about the log, one sentence each.
     pub doubts: Vec<String>,
     /// Vertical air speed and standard error by whole seconds of show time from `air_first_s` on, m/s.
@@ -79,6 +84,8 @@ pub struct Player {
     /// Tracks by slot, each with what was planned.
     tracks: Vec<(Track, Trajectory)>,
     air: Option<FleetAir>,
+    /// What the station has said in that flight.
+    said: Vec<Said>,
     ends_s: [f64; 2],
     state: Mutex<Playing>,
 }
@@ -100,18 +107,20 @@ impl std::fmt::Debug for Player {
 }
 
 impl Player {
-    /// A replay that begins at once.
+    /// A replay that begins at once; `said`: what its station has said then, numbered from 1.
     pub fn new(
         plan: &Plan,
         clock: Arc<dyn Clock>,
         mut tracks: Vec<Track>,
-        air: Option<FleetAir>,
+        (air, said): (Option<FleetAir>, Vec<Said>),
         speed: f64,
     ) -> Self {
         tracks.sort_by_key(|track| track.slot);
-        let first = tracks.iter().map(|track| track.first_s).reduce(f64::min);
-        let end = |track: &Track| track.first_s + track.step_s * track.place_m.len() as f64;
-        let last = tracks.iter().map(end).reduce(f64::max);
+        // Words before and after a log do not make the flight longer; without logs they are all there is.
+        let logged = tracks.iter().any(Track::is_logged);
+        let counts = || tracks.iter().filter(|track| track.is_logged() || !logged);
+        let first = counts().map(|track| track.first_s).reduce(f64::min);
+        let last = counts().map(Track::end_s).reduce(f64::max);
         let ends_s = [first.unwrap_or(0.0).floor(), last.unwrap_or(0.0).ceil()];
         let state = Playing {
             speed: speed.clamp(SPEEDS[0], SPEEDS[1]),
@@ -125,7 +134,7 @@ impl Player {
             (track, trajectory)
         };
         let tracks = tracks.into_iter().map(planned).collect();
-        Self { plan: plan.clone(), clock, tracks, air, ends_s, state: Mutex::new(state) }
+        Self { plan: plan.clone(), clock, tracks, air, said, ends_s, state: Mutex::new(state) }
     }
 
     fn lock(&self) -> MutexGuard<'_, Playing> {
@@ -149,6 +158,19 @@ impl Player {
 }
 
 impl Track {
+    /// Whether it has places, not words alone.
+    fn is_logged(&self) -> bool {
+        !self.place_m.is_empty()
+    }
+
+    /// Show time at which its log ends, or of its last words, s.
+    fn end_s(&self) -> f64 {
+        match self.words.last() {
+            Some((said_s, _)) if !self.is_logged() => *said_s,
+            _ => self.first_s + self.step_s * self.place_m.len() as f64,
+        }
+    }
+
     fn place(&self, time_s: f64) -> Option<[f64; 3]> {
         let at = (time_s - self.first_s) / self.step_s;
         if at < 0.0 {
@@ -163,6 +185,13 @@ impl Track {
     fn by_second<T: Copy>(values: &[Option<T>], first_s: f64, time_s: f64) -> Option<T> {
         let index = (time_s - first_s).round();
         (index >= 0.0).then(|| values.get(index as usize).copied().flatten())?
+    }
+
+    /// Latest words, which a live page would show at this time.
+    fn words_at(&self, time_s: f64) -> String {
+        let until = self.words.partition_point(|(said_s, _)| *said_s <= time_s);
+        let last = until.checked_sub(1).and_then(|at| self.words.get(at));
+        last.map_or_else(String::new, |(_, words)| words.clone())
     }
 
     fn view(&self, planned: &Trajectory, time_s: f64) -> DroneView {
@@ -181,8 +210,9 @@ impl Track {
         let distance_m = place_m.zip(wanted).map(|(place, wanted)| {
             (0..3).map(|i| (place[i] - wanted[i]).powi(2)).sum::<f64>().sqrt()
         });
-        let ended = time_s > self.first_s + self.step_s * self.place_m.len() as f64;
+        let ended = self.is_logged() && time_s > self.end_s();
         let (level, trouble) = match distance_m {
+            _ if !self.is_logged() => (Level::Notice, NO_LOG.to_owned()),
             Some(far_m) if far_m > FAR_M => {
                 (Level::Alarm, format!("{far_m:.1} m off its trajectory"))
             }
@@ -201,6 +231,7 @@ impl Track {
             distance_m: distance_m.map(centi),
             level,
             trouble,
+            words: self.words_at(time_s),
             air_mps: air.map(|[value, _]| centi(f64::from(value))),
             air_se_mps: air.map(|[_, error]| centi(f64::from(error))),
             ..DroneView::default()
@@ -224,7 +255,7 @@ impl Source for Player {
                     slot: Some(slot.slot),
                     stage: "no log".to_owned(),
                     level: Level::Notice,
-                    trouble: "its log is not here".to_owned(),
+                    trouble: NO_LOG.to_owned(),
                     ..DroneView::default()
                 },
             }
@@ -233,12 +264,13 @@ impl Source for Player {
         let doubts = self.tracks.iter().flat_map(|(track, _)| {
             track.doubts.iter().map(|doubt| format!("slot {}: {doubt}", track.slot))
         });
-        let said = doubts.zip(1..).map(|(text, number)| Said {
+        let doubts = doubts.zip(1 + self.said.len() as u64..).map(|(text, number)| Said {
             number,
             at_ms: now_ms,
             level: Level::Notice,
             text,
         });
+        let said = self.said.iter().cloned().chain(doubts);
         View {
             now_ms,
             show_s: Some(centi(state.at_s)),

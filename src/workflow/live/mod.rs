@@ -4,6 +4,7 @@ mod agreement;
 mod air;
 mod host;
 mod of_map;
+mod recorded;
 mod replay;
 mod serve;
 

@@ -1,4 +1,4 @@
-//! A flown or simulated campaign in a browser, from its logs.
+//! A flown or simulated campaign in a browser, from its logs and its journal.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::of_map;
+use super::recorded::OfJournal;
 use super::serve::{LiveWish, Served, serve};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::slots::whose_logs;
@@ -14,7 +15,7 @@ use crate::analysis::{FlightInput, LogInput};
 use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
 use crate::campaign::origin::{self, LogOrigin};
-use crate::campaign::{self, read_json};
+use crate::campaign::{self, FlightFolder, read_json};
 use crate::flight::{Flight, FlightOptions, Series};
 use crate::live::player::{FleetAir, Player, Track};
 use crate::live::source::Source;
@@ -36,7 +37,7 @@ const LONGEST_S: f64 = 6.0 * 3600.0;
 pub(crate) struct ReplayWish {
     /// Folder of the campaign.
     pub(crate) campaign: PathBuf,
-    /// Name of the flight; absent: the last that has logs.
+    /// Name of the flight; absent: the last that has logs, or else the last that has a journal.
     pub(crate) flight: Option<String>,
     /// Whose logs; absent: real drones', if there are any.
     pub(crate) origin: Option<LogOrigin>,
@@ -49,14 +50,14 @@ pub(crate) struct Replayed {
     _served: Served,
     /// Name of the flight.
     pub(crate) flight: String,
-    /// Drones with a log.
-    pub(crate) drones: usize,
+    /// Drones with a log, and drones of which the journal alone tells.
+    pub(crate) drones: (usize, usize),
 }
 
-/// Reads the logs of a flight, and serves its page.
+/// Reads the logs and the journal of a flight, and serves its page.
 ///
 /// # Errors
-/// If there is no such flight, it has no logs, or none can be read.
+/// If there is no such flight, it has neither logs nor a journal, or none can be read.
 pub(crate) fn replay(
     host: &dyn Host,
     wish: &ReplayWish,
@@ -77,10 +78,23 @@ pub(crate) fn replay(
     let analysed = analysis
         .as_ref()
         .and_then(|analysis| analysis.flights.iter().find(|flight| flight.name == found.name));
-    let tracks = tracks(host, found, plan, analysed)?;
-    let drones = tracks.len();
+    let journal = of_journal(host, &work, &folders, found)?;
+    let mut tracks = match found.logs[..] {
+        [] => Vec::new(),
+        _ => tracks(host, found, plan, analysed)?,
+    };
+    let logged = tracks.len();
+    let OfJournal { tracks: mut of_slot, said } = journal;
+    for track in &mut tracks {
+        track.words = of_slot.remove(&track.slot).map(|told| told.words).unwrap_or_default();
+    }
+    tracks.extend(of_slot.into_values());
+    let drones = (logged, tracks.len() - logged);
+    if tracks.is_empty() {
+        return Err(nothing(&found.name));
+    }
     let air = analysed.and_then(fleet_air);
-    let player = Player::new(plan, Arc::clone(host.clock()), tracks, air, wish.speed);
+    let player = Player::new(plan, Arc::clone(host.clock()), tracks, (air, said), wish.speed);
     let source: Arc<dyn Source> = Arc::new(player);
     let served = serve(host, &wish.campaign, &source, live)?;
     Ok(Replayed { _served: served, flight: found.name.clone(), drones })
@@ -90,24 +104,49 @@ pub(crate) fn replay(
 fn chosen<'a>(work: &'a Work, name: Option<&str>) -> Result<&'a Found, WorkflowError> {
     let names =
         || work.flights.iter().map(|found| found.name.as_str()).collect::<Vec<_>>().join(", ");
-    let found = match name {
+    match name {
         Some(name) => work.flights.iter().find(|found| found.name == name).ok_or_else(|| {
             WorkflowError::Usage(format!("the campaign has no flight \"{name}\", but {}", names()))
-        })?,
-        None => work.flights.iter().rev().find(|found| !found.logs.is_empty()).ok_or_else(|| {
-            WorkflowError::Nothing(format!(
-                "no flight of the campaign ({}) has logs: fly it, or simulate it with `updraft simulate`",
-                names()
-            ))
-        })?,
-    };
-    if found.logs.is_empty() {
-        return Err(WorkflowError::Nothing(format!(
-            "{} has no logs: fly it, or simulate it with `updraft simulate`",
-            found.name
-        )));
+        }),
+        None => {
+            let logged = work.flights.iter().rev().find(|found| !found.logs.is_empty());
+            let flown = |found: &&Found| found.start.is_some();
+            logged
+                .or_else(|| work.flights.iter().rev().find(flown))
+                .ok_or_else(|| nothing(&names()))
+        }
     }
-    Ok(found)
+}
+
+fn nothing(names: &str) -> WorkflowError {
+    WorkflowError::Nothing(format!(
+        "{names}: neither logs nor the journal of a flight: fly it, or simulate it with `updraft simulate`"
+    ))
+}
+
+/// What the journal says of the flight; nothing of flights that were simulated.
+fn of_journal(
+    host: &dyn Host,
+    work: &Work,
+    folders: &[FlightFolder],
+    found: &Found,
+) -> Result<OfJournal, WorkflowError> {
+    if work.origin == Some(LogOrigin::Simulated) {
+        return Ok(OfJournal::default());
+    }
+    let is_its = |folder: &&FlightFolder| {
+        folder
+            .read_plan()
+            .is_ok_and(|plan| Some(&plan.name) == found.plan.as_ref().map(|of| &of.name))
+    };
+    let Some(folder) = folders.iter().find(is_its) else { return Ok(OfJournal::default()) };
+    match OfJournal::read(folder) {
+        Err(error) if !found.logs.is_empty() => {
+            host.warn(&format!("replayed without its journal: {}", with_causes(&error, ": ")));
+            Ok(OfJournal::default())
+        }
+        read => read,
+    }
 }
 
 /// One track for each log whose slot is known.
@@ -211,6 +250,7 @@ fn track(
                 Some(volts as f32)
             })
             .collect(),
+        words: Vec::new(),
         stages: flight.stages.clone(),
         armed_s: flight.armed_s.clone(),
         doubts: flight.warnings.iter().map(ToString::to_string).collect(),
