@@ -212,7 +212,8 @@ impl Track {
         });
         let ended = self.is_logged() && time_s > self.end_s();
         let (level, trouble) = match distance_m {
-            _ if !self.is_logged() => (Level::Notice, NO_LOG.to_owned()),
+            // What its station said of it is all that there is.
+            _ if !self.is_logged() => (Level::Good, String::new()),
             Some(far_m) if far_m > FAR_M => {
                 (Level::Alarm, format!("{far_m:.1} m off its trajectory"))
             }

@@ -1,0 +1,115 @@
+//! Covariances of records with themselves and others, by lag.
+
+use crate::Record;
+
+/// Covariance of a record with a later part of another, at lags of 0, 1, ... steps up to `lags`: the mean product of
+/// anomalies over all pairs that are known; NaN where there is none. Records with other steps have none in common.
+pub fn cross(a: &Record, b: &Record, lags: usize) -> Vec<f64> {
+    if (a.step_s() - b.step_s()).abs() > 1e-9 * a.step_s() {
+        return vec![f64::NAN; lags + 1];
+    }
+    let (a, b) = (a.anomalies(), b.anomalies());
+    let (a, b) = (a.values(), b.values());
+    let at = |lag: usize| {
+        let later = b.get(lag..).unwrap_or_default();
+        let (mut sum, mut count) = (0.0, 0usize);
+        for (one, other) in a.iter().zip(later) {
+            let product = one * other;
+            if !product.is_nan() {
+                sum += product;
+                count += 1;
+            }
+        }
+        if count == 0 { f64::NAN } else { sum / count as f64 }
+    };
+    (0..=lags).map(at).collect()
+}
+
+/// Covariance of a record with itself, at lags of 0, 1, ... steps up to `lags`.
+pub fn auto(record: &Record, lags: usize) -> Vec<f64> {
+    cross(record, record, lags)
+}
+
+/// An exponential of the lag that fits an autocovariance: variance and integral time, corrected for the mean that was
+/// taken from the same record.
+///
+/// The mean of a finite record follows the air, and takes part of the variance away: `var(mean) = 2 T/t (1 - T/t (1 -
+/// exp(-t/T)))` of it for a record of length `t` and an exponential of integral time `T` (Lenschow, Mann and Kristensen
+/// 1994, eq. 14). That is not small where a record has ten integral times, and it lowers the autocovariance at every
+/// lag alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exponential {
+    /// Variance, without noise.
+    pub variance: f64,
+    /// Integral time, s.
+    pub time_s: f64,
+    /// Share of the variance that is in the mean of the record.
+    pub in_mean: f64,
+}
+
+/// Share of the variance that the mean of a record of `length_s` has, of an exponential with this integral time.
+pub fn share_in_mean(time_s: f64, length_s: f64) -> f64 {
+    let ratio = time_s / length_s;
+    2.0 * ratio * (1.0 - ratio * -(-1.0 / ratio).exp_m1())
+}
+
+impl Exponential {
+    /// Fits lags from `from` on to the first at which nothing is left; `None` of what does not decay.
+    pub fn fit(autocovariance: &[f64], step_s: f64, length_s: f64, from: usize) -> Option<Self> {
+        let end = autocovariance.iter().position(|value| !(*value > 0.0))?;
+        // Beyond the first zero it is what one realisation happens to be.
+        let used = autocovariance.get(from..end.max(from + 3)).filter(|used| used.len() >= 3)?;
+        let mut best: Option<(f64, Self)> = None;
+        let mut time_s = 0.3 * step_s;
+        while time_s < length_s {
+            let share = share_in_mean(time_s, length_s);
+            let shape = |k: usize| (-((from + k) as f64) * step_s / time_s).exp() - share;
+            let (mut cross, mut square) = (0.0, 0.0);
+            for (k, value) in used.iter().enumerate() {
+                cross += shape(k) * value;
+                square += shape(k).powi(2);
+            }
+            let variance = cross / square;
+            let left: f64 = used
+                .iter()
+                .enumerate()
+                .map(|(k, value)| (value - variance * shape(k)).powi(2))
+                .sum();
+            if variance > 0.0 && best.as_ref().is_none_or(|(least, _)| left < *least) {
+                best = Some((left, Self { variance, time_s, in_mean: share }));
+            }
+            time_s *= 1.03;
+        }
+        best.map(|(_, found)| found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn covariances_are_mean_products() {
+        let a = Record::new(1.0, [1.0, 2.0, 3.0, 4.0].map(Some));
+        // Anomalies -1.5, -0.5, 0.5, 1.5.
+        assert_eq!(auto(&a, 2), [1.25, (0.75 - 0.25 + 0.75) / 3.0, (-0.75 - 0.75) / 2.0]);
+        let b = Record::new(1.0, [Some(0.0), None, Some(2.0), Some(4.0)]);
+        // Anomalies -2, -, 0, 2 with -1.5, -, 0.5, 1.5.
+        assert_eq!(cross(&a, &b, 0), [(3.0 + 0.0 + 3.0) / 3.0]);
+        assert!(cross(&a, &Record::new(0.5, [Some(1.0)]), 0)[0].is_nan());
+        assert!(auto(&a, 7)[6].is_nan());
+    }
+
+    #[test]
+    fn an_exponential_is_found_again() {
+        let (time_s, length_s, variance) = (8.0, 120.0, 0.36);
+        let share = share_in_mean(time_s, length_s);
+        assert!((share - 2.0 * 8.0 / 120.0 * (1.0 - 8.0 / 120.0)).abs() < 1e-6);
+        let all: Vec<f64> =
+            (0..200).map(|k| variance * ((-f64::from(k) * 0.5 / time_s).exp() - share)).collect();
+        let found = Exponential::fit(&all, 0.5, length_s, 1).unwrap();
+        assert!((found.time_s / time_s - 1.0).abs() < 0.03, "{found:?}");
+        assert!((found.variance / variance - 1.0).abs() < 0.02, "{found:?}");
+        assert_eq!(Exponential::fit(&[1.0, -1.0], 1.0, 10.0, 0), None);
+    }
+}

@@ -1,0 +1,137 @@
+//! Covariances between points and advection in a drawn field that the wind carries past a grid of drones.
+
+use rand::SeedableRng as _;
+use rand_distr::{Distribution as _, StandardNormal, Uniform};
+use rand_pcg::Pcg64;
+use turbulence_statistics::points::{At, advection, by_distance};
+use turbulence_statistics::{Record, moments, spectrum};
+
+const STEP_S: f64 = 0.5;
+const COUNT: usize = 1200;
+const WAVES: usize = 400;
+
+/// A frozen field of waves with the covariance `sd² exp(-d/length)` in the plane, carried along.
+struct Field {
+    waves: Vec<([f64; 2], f64, f64)>,
+    wind_mps: [f64; 2],
+}
+
+impl Field {
+    fn draw(seed: u64, sd_mps: f64, length_m: f64, wind_mps: [f64; 2]) -> Self {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let unit = Uniform::new(0.0, 1.0).unwrap();
+        let mut draw = || -> f64 { unit.sample(&mut random) };
+        let waves = (0..WAVES).map(|_| {
+            // The plane's spectrum of an exponential is k (k² + 1/L²)^(-3/2): its distribution turned round.
+            let left: f64 = 1.0 - draw();
+            let k = (left.powi(-2) - 1.0).sqrt() / length_m;
+            let angle = std::f64::consts::TAU * draw();
+            let amplitude = sd_mps * (2.0 / WAVES as f64).sqrt();
+            ([k * angle.cos(), k * angle.sin()], std::f64::consts::TAU * draw(), amplitude)
+        });
+        Self { waves: waves.collect(), wind_mps }
+    }
+
+    fn record(&self, [x, y]: [f64; 2], noise: &mut impl FnMut() -> f64) -> Record {
+        let at = |step: usize| {
+            let time_s = step as f64 * STEP_S;
+            let [east, north] = [x - self.wind_mps[0] * time_s, y - self.wind_mps[1] * time_s];
+            let waves = self.waves.iter();
+            waves
+                .map(|([kx, ky], phase, of)| of * (kx * east + ky * north + phase).cos())
+                .sum::<f64>()
+        };
+        Record::new(STEP_S, (0..COUNT).map(|step| Some(at(step) + noise())).collect::<Vec<_>>())
+    }
+}
+
+fn grid(side: usize, spacing_m: f64) -> Vec<[f64; 2]> {
+    let at = |k: usize| spacing_m * k as f64;
+    (0..side * side).map(|k| [at(k / side), at(k % side)]).collect()
+}
+
+fn fleet(seed: u64, sd_mps: f64, length_m: f64, wind_mps: [f64; 2]) -> Vec<([f64; 2], Record)> {
+    let field = Field::draw(seed, sd_mps, length_m, wind_mps);
+    let mut random = Pcg64::seed_from_u64(seed + 1000);
+    let mut noise =
+        || -> f64 { 0.05 * rand_distr::Distribution::<f64>::sample(&StandardNormal, &mut random) };
+    grid(4, 15.0).into_iter().map(|place| (place, field.record(place, &mut noise))).collect()
+}
+
+fn points(fleet: &[([f64; 2], Record)]) -> Vec<At<'_>> {
+    fleet.iter().map(|(place_m, record)| At { place_m: *place_m, record }).collect()
+}
+
+#[test]
+fn covariances_between_points_are_those_of_the_field() {
+    let (sd_mps, length_m) = (0.5, 40.0);
+    let mut off = Vec::new();
+    let mut inside = (0, 0);
+    let mut fleet_inside = 0;
+    const SEEDS: u64 = 60;
+    for seed in 0..SEEDS {
+        let fleet = fleet(seed, sd_mps, length_m, [3.0, 1.0]);
+        for class in by_distance(&points(&fleet), 10.0, 4, 0.0) {
+            // The mean of the classes' pairs.
+            let truth = sd_mps.powi(2) * (-class.distance_m / length_m).exp();
+            off.push((class.covariance.value - truth).abs());
+            inside.1 += 1;
+            inside.0 +=
+                usize::from(class.covariance.low <= truth && truth <= class.covariance.high);
+        }
+        let records: Vec<&Record> = fleet.iter().map(|(_, record)| record).collect();
+        let all = moments::mean_variance(&records, &[0.05f64.powi(2); 16], 0.0).unwrap();
+        fleet_inside += u64::from(all.low <= 0.25 && 0.25 <= all.high);
+    }
+    off.sort_by(f64::total_cmp);
+    let median = off[off.len() / 2];
+    let held = inside.0 as f64 / inside.1 as f64;
+    println!("median off {median}, inside {held}, fleet {fleet_inside} of {SEEDS}");
+    assert!(median < 0.05, "{median}");
+    assert!(held > 0.9, "{held}");
+    assert!(fleet_inside >= 52, "{fleet_inside}");
+}
+
+#[test]
+fn the_wind_is_found_by_what_it_carries() {
+    let mut off = Vec::new();
+    let mut sum = [0.0, 0.0];
+    const SEEDS: u64 = 24;
+    for seed in 0..SEEDS {
+        let (sin, cos) = (std::f64::consts::TAU * seed as f64 / SEEDS as f64).sin_cos();
+        let fleet = fleet(seed, 0.5, 40.0, [3.0 * cos, 3.0 * sin]);
+        let found = advection(&points(&fleet), 60.0).unwrap();
+        let [x, y] = found.velocity_mps;
+        sum = [sum[0] + x * cos + y * sin, sum[1] + y * cos - x * sin];
+        off.push((found.speed_mps() / 3.0 - 1.0).abs());
+    }
+    off.sort_by(f64::total_cmp);
+    let [along, across] = sum.map(|sum| sum / SEEDS as f64);
+    let within = off.iter().filter(|off| **off < 0.15).count();
+    println!(
+        "along {along}, across {across}, within 15 %: {within}, median {}",
+        off[off.len() / 2]
+    );
+    assert!((along - 3.0).abs() < 0.15 && across.abs() < 0.3, "{along} {across}");
+    assert!(off[off.len() / 2] < 0.1 && within >= 20, "{off:?}");
+    // Drones that see nothing in common tell no wind.
+    let apart: Vec<_> =
+        (0..16).map(|k| fleet(100 + k, 0.5, 40.0, [3.0, 1.0]).swap_remove(k as usize)).collect();
+    assert_eq!(advection(&points(&apart), 60.0), None);
+}
+
+#[test]
+fn a_fleets_spectrum_knows_how_coherent_it_is() {
+    let fleet = fleet(5, 0.5, 200.0, [3.0, 1.0]);
+    let records: Vec<&Record> = fleet.iter().map(|(_, record)| record).collect();
+    let instrument = spectrum::Instrument::default();
+    let one = spectrum::spectrum(records[0], &instrument);
+    let all = spectrum::mean(&records, &instrument);
+    // Large eddies hold all drones, so that they know little more together.
+    assert!(all[0].freedom < 3.0 * one[0].freedom, "{:?} {:?}", all[0], one[0]);
+    let last = (one.last().unwrap(), all.last().unwrap());
+    assert!(last.1.freedom > 5.0 * last.0.freedom, "{last:?}");
+    let cross = spectrum::cross(records[0], records[1], &instrument);
+    let first = cross.iter().find(|band| band.freedom > 10.0).unwrap();
+    assert!(first.coherence > first.coherence_threshold, "{first:?}");
+}
