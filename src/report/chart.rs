@@ -12,7 +12,9 @@ use kuva::render::theme::Theme;
 
 use super::axis::Axis;
 use super::colour::{INK, RULE};
+use super::format::Format;
 use super::legend::{self, Corner, Inked};
+use super::print_panel::{fitting, legend_below, legend_height, title, with_room_for_labels};
 use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
@@ -27,6 +29,8 @@ const BAR_MARGIN: f64 = 62.0;
 const LEFT_MARGIN: f64 = 66.0;
 const TOP_MARGIN: f64 = 30.0;
 const BOTTOM_MARGIN: f64 = 46.0;
+/// Size of its title, pixels.
+const TITLE: u32 = 14;
 
 /// Where the frame of a panel of a size lies in it, [x, y, width, height], pixels; `room_right`: with
 /// [`Panel::leave_room_right`].
@@ -67,6 +71,7 @@ pub(super) struct Panel {
     legend_box: bool,
     inked: Inked,
     right_margin: f64,
+    settled: bool,
 }
 
 impl Panel {
@@ -86,6 +91,7 @@ impl Panel {
             legend_box: true,
             inked: Inked::default(),
             right_margin: RIGHT_MARGIN,
+            settled: false,
         }
     }
 
@@ -179,8 +185,21 @@ impl Panel {
     }
 
     /// Draws the panel into a scene of this size, pixels.
-    pub(super) fn draw(mut self, width: f64, height: f64) -> Scene {
-        self.place_legend(width, height);
+    pub(super) fn draw(mut self, format: Format, [width, height]: [f64; 2]) -> Scene {
+        let below = self.legend_below(format);
+        let room = if below.is_empty() { 0.0 } else { legend_height(&below, width - 8.0) };
+        let bottom = BOTTOM_MARGIN + room;
+        let mut title_at = (self.title.clone(), LEFT_MARGIN);
+        if format.is_print() {
+            let frame = width - LEFT_MARGIN - self.right_margin;
+            if !self.log_x {
+                with_room_for_labels(&mut self.x, frame);
+            }
+            self.x.label = fitting(&self.x.label, 2.0 * (width - LEFT_MARGIN - frame / 2.0));
+            self.y.label = fitting(&self.y.label, height - room);
+            title_at = title(&self.title, LEFT_MARGIN, width, f64::from(TITLE));
+        }
+        self.settle([width, height]);
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
             .with_width(width)
             .with_height(height)
@@ -194,7 +213,7 @@ impl Panel {
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
             .with_force_margins(LEFT_MARGIN, self.right_margin)
-            .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
+            .with_force_margins_y(TOP_MARGIN, bottom)
             .with_label_size(13)
             .with_tick_size(12)
             .with_body_size(12)
@@ -214,22 +233,42 @@ impl Panel {
         let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
         scene.elements.extend(front);
         scene.elements.push(Primitive::Text {
-            x: LEFT_MARGIN,
+            x: title_at.1,
             y: 17.0,
-            content: self.title,
-            size: 14,
+            content: title_at.0,
+            size: TITLE,
             anchor: TextAnchor::Start,
             rotate: None,
             bold: true,
             color: None,
         });
+        scene.elements.extend(legend_below(&below, [8.0, height - room], width - 8.0));
         scene
+    }
+
+    /// The ranges of x and y that are drawn in a panel of a size, once there is room for the legend.
+    pub(super) fn ranges(&mut self, size: [f64; 2]) -> [[f64; 2]; 2] {
+        self.settle(size);
+        [[self.x.min, self.x.max], [self.y.min, self.y.max]]
     }
 }
 
 impl Panel {
+    /// The entries of a legend that has no room beside the panel and is drawn below it.
+    fn legend_below(&mut self, format: Format) -> Vec<LegendEntry> {
+        let is_beside = matches!(self.legend_position, LegendPosition::OutsideRightTop);
+        if !(format.is_narrow() && is_beside) {
+            return Vec::new();
+        }
+        self.right_margin = RIGHT_MARGIN;
+        std::mem::take(&mut self.legend)
+    }
+
     /// Moves a legend off the data: to a free corner, else with more room at the top.
-    fn place_legend(&mut self, width: f64, height: f64) {
+    fn settle(&mut self, [width, height]: [f64; 2]) {
+        if std::mem::replace(&mut self.settled, true) {
+            return;
+        }
         let Some(mut corner) = Corner::of(self.legend_position).filter(|_| !self.legend.is_empty())
         else {
             return;

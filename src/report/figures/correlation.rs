@@ -11,6 +11,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION};
+use crate::report::format::Format;
 use crate::report::scales::{interval, not_determined, paper_form};
 use crate::report::shapes::Shape;
 use crate::report::sheet::Sheet;
@@ -32,6 +33,7 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     statistics: &FieldStatistics,
+    format: Format,
 ) -> Option<Figure> {
     let space = statistics.space.as_ref();
     let y = correlation_axis(statistics);
@@ -56,11 +58,12 @@ pub(in crate::report) fn figure(
         return None;
     }
     let rows = panels.len().div_ceil(2);
-    let mut sheet = Sheet::new(1040.0, rows as f64 * PANEL[1] + 4.0);
-    for (index, panel) in panels.into_iter().enumerate() {
+    let place = |index: usize| {
         let (column, row) = ((index % 2) as f64, (index / 2) as f64);
-        sheet.place(panel.draw(PANEL[0], PANEL[1]), column * 522.0, row * PANEL[1]);
-    }
+        [column * 522.0, row * PANEL[1], PANEL[0], PANEL[1]]
+    };
+    let panels = panels.into_iter().enumerate().map(|(index, panel)| (panel, place(index)));
+    let sheet = Sheet::of(format, [1040.0, rows as f64 * PANEL[1] + 4.0], panels.collect());
     let name = format!("fig6-{key}");
     let title =
         format!("Correlations of the vertical air speed, {} (paper's Fig. 6)", clean(&flight.name));
