@@ -14,7 +14,7 @@ use super::axis::Axis;
 use super::colour::{INK, RULE};
 use super::format::Format;
 use super::legend::{self, Corner, Inked};
-use super::print_panel::{fitting, legend_below, legend_height, title, with_room_for_labels};
+use super::print_panel::{fitting, legend_below, legend_height, title, with_room_between, with_room_for_labels};
 use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
@@ -179,6 +179,11 @@ impl Panel {
         self.front_shapes.push(shape);
     }
 
+    /// Keeps the legend off a line that a shape draws.
+    pub(super) fn keep_clear(&mut self, points: &[(f64, f64)]) {
+        self.inked.line(points);
+    }
+
     /// A logarithmic x axis.
     pub(super) fn logarithmic_x(&mut self) {
         self.log_x = true;
@@ -186,9 +191,10 @@ impl Panel {
 
     /// Draws the panel into a scene of this size, pixels.
     pub(super) fn draw(mut self, format: Format, [width, height]: [f64; 2]) -> Scene {
-        let below = self.legend_below(format);
-        let room = if below.is_empty() { 0.0 } else { legend_height(&below, width - 8.0) };
-        let bottom = BOTTOM_MARGIN + room;
+        let below = self.legend_below(format, [width, height]);
+        let room = if below.is_empty() { 0.0 } else { legend_height(&below, width) };
+        let legend_top = height - room;
+        let height = legend_top;
         let mut title_at = (self.title.clone(), LEFT_MARGIN);
         if format.is_print() {
             let frame = width - LEFT_MARGIN - self.right_margin;
@@ -196,7 +202,8 @@ impl Panel {
                 with_room_for_labels(&mut self.x, frame);
             }
             self.x.label = fitting(&self.x.label, 2.0 * (width - LEFT_MARGIN - frame / 2.0));
-            self.y.label = fitting(&self.y.label, height - room);
+            self.y.label = fitting(&self.y.label, height);
+            with_room_between(&mut self.y, height - TOP_MARGIN - BOTTOM_MARGIN);
             title_at = title(&self.title, LEFT_MARGIN, width, f64::from(TITLE));
         }
         self.settle([width, height]);
@@ -213,7 +220,7 @@ impl Panel {
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
             .with_force_margins(LEFT_MARGIN, self.right_margin)
-            .with_force_margins_y(TOP_MARGIN, bottom)
+            .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
             .with_label_size(13)
             .with_tick_size(12)
             .with_body_size(12)
@@ -242,7 +249,7 @@ impl Panel {
             bold: true,
             color: None,
         });
-        scene.elements.extend(legend_below(&below, [8.0, height - room], width - 8.0));
+        scene.elements.extend(legend_below(&below, legend_top, width));
         scene
     }
 
@@ -254,14 +261,42 @@ impl Panel {
 }
 
 impl Panel {
-    /// The entries of a legend that has no room beside the panel and is drawn below it.
-    fn legend_below(&mut self, format: Format) -> Vec<LegendEntry> {
-        let is_beside = matches!(self.legend_position, LegendPosition::OutsideRightTop);
-        if !(format.is_narrow() && is_beside) {
+    /// The entries of a legend that is drawn below a panel in print: there is no room beside it, or no free corner in
+    /// it, and axes do not grow for it there.
+    fn legend_below(&mut self, format: Format, size: [f64; 2]) -> Vec<LegendEntry> {
+        if !format.is_print() || self.settled || self.legend.is_empty() {
             return Vec::new();
         }
-        self.right_margin = RIGHT_MARGIN;
-        std::mem::take(&mut self.legend)
+        if matches!(self.legend_position, LegendPosition::OutsideRightTop) {
+            if !format.is_narrow() {
+                return Vec::new();
+            }
+            self.right_margin = RIGHT_MARGIN;
+            return std::mem::take(&mut self.legend);
+        }
+        match Corner::of(self.legend_position) {
+            Some(wanted) if self.free_corner(wanted, size).1 > 0 => {
+                std::mem::take(&mut self.legend)
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The corner that has the least behind the legend, and how many points are there.
+    fn free_corner(&self, wanted: Corner, [width, height]: [f64; 2]) -> (Corner, usize) {
+        let labels: Vec<&str> = self.legend.iter().map(|entry| entry.label.as_str()).collect();
+        let frame = [width - LEFT_MARGIN - self.right_margin, height - TOP_MARGIN - BOTTOM_MARGIN];
+        let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
+        let place = |[at_x, at_y]: [f64; 2]| {
+            let (x, y) = (&self.x, &self.y);
+            let across = if self.log_x {
+                share(at_x.ln(), x.min.ln(), x.max.ln())
+            } else {
+                share(at_x, x.min, x.max)
+            };
+            [across, 1.0 - share(at_y, y.min, y.max)]
+        };
+        legend::corner(&self.inked, wanted, legend::size(&labels), frame, place)
     }
 
     /// Moves a legend off the data: to a free corner, else with more room at the top.
@@ -273,21 +308,8 @@ impl Panel {
         else {
             return;
         };
-        let labels: Vec<&str> = self.legend.iter().map(|entry| entry.label.as_str()).collect();
-        let size = legend::size(&labels);
-        let frame = [width - LEFT_MARGIN - self.right_margin, height - TOP_MARGIN - BOTTOM_MARGIN];
         for _ in 0..MOST_ROOM {
-            let (x, y, log_x) = (&self.x, &self.y, self.log_x);
-            let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
-            let place = |[at_x, at_y]: [f64; 2]| {
-                let across = if log_x {
-                    share(at_x.ln(), x.min.ln(), x.max.ln())
-                } else {
-                    share(at_x, x.min, x.max)
-                };
-                [across, 1.0 - share(at_y, y.min, y.max)]
-            };
-            let (free, covered) = legend::corner(&self.inked, corner, size, frame, place);
+            let (free, covered) = self.free_corner(corner, [width, height]);
             corner = free;
             self.legend_position = corner.position();
             if covered == 0 {

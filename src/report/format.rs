@@ -13,8 +13,12 @@ const LEAST_TEXT: f64 = 11.0;
 const NARROW: f64 = 550.0;
 /// Width of the page's figures, pixels.
 const PAGE_WIDTH: f64 = 1040.0;
-/// Highest panel of a narrow figure, as a share of its width.
+/// Highest panel of a narrow figure, as a share of its width, and the lowest to which panels are shrunk that do not
+/// fit on a page below each other.
 const TALLEST: f64 = 0.75;
+const LOWEST: f64 = 0.5;
+/// Height of the type area of a page, mm: nothing that is higher can be printed on one.
+pub(super) const PAGE_HEIGHT_MM: f64 = 232.0;
 
 /// What a figure is drawn for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -92,9 +96,13 @@ impl Format {
         }
         // What is above the first of them stays there.
         let mut top = places.iter().map(|place| place[1]).reduce(f64::min).unwrap_or(0.0);
-        let stacked = places.iter().map(|[_, _, _, h]| {
-            let place = [0.0, top, width, h.min(TALLEST * width)];
-            top += place[3];
+        let heights = places.iter().map(|place| place[3].min(TALLEST * width));
+        let room = PAGE_HEIGHT_MM * POINTS_PER_MM / POINTS_PER_PIXEL - top;
+        let share = (room / heights.clone().sum::<f64>()).min(1.0);
+        let stacked = heights.map(|height| {
+            let height = height.min((height * share).floor().max(LOWEST * width));
+            let place = [0.0, top, width, height];
+            top += height;
             place
         });
         let stacked = stacked.collect();

@@ -9,17 +9,21 @@ use super::axis::{Axis, decimals_of};
 use super::text::{fixed, shortened};
 
 /// Width of a letter, as a share of its size: on average, and in bold.
-const LETTER: f64 = 0.56;
-const BOLD_LETTER: f64 = 0.6;
+const LETTER: f64 = 0.53;
+const BOLD_LETTER: f64 = 0.53;
 /// Size of the labels of ticks and of the legend, and of those of axes, pixels.
 pub(super) const SMALL: f64 = 12.0;
 const LABEL: f64 = 13.0;
 /// Space between two labels of ticks, pixels.
 const BETWEEN: f64 = 9.0;
+/// Height of a label of a tick and of the space above it, pixels.
+const LINE: f64 = 18.0;
 /// Height of a row of the legend, its swatch with the space around it, and the space above it, pixels.
 const ROW: f64 = 17.0;
 const SWATCH: f64 = 34.0;
 const ABOVE: f64 = 4.0;
+/// Where the frame of a panel begins, pixels.
+const FRAME_LEFT: f64 = 66.0;
 
 /// Width of a text, about, pixels.
 pub(super) fn width_of(text: &str, size: f64, bold: bool) -> f64 {
@@ -33,6 +37,16 @@ pub(super) fn with_room_for_labels(axis: &mut Axis, pixels: f64) {
         let ticks = (axis.max - axis.min) / axis.step;
         let widest = label(axis.min, axis.step).max(label(axis.max, axis.step));
         if ticks * (widest + BETWEEN) <= pixels {
+            return;
+        }
+        axis.step *= factor;
+    }
+}
+
+/// Fewer ticks where their labels would stand closer than lines of text in so many pixels of height.
+pub(super) fn with_room_between(axis: &mut Axis, pixels: f64) {
+    for factor in [2.0, 2.5, 2.0] {
+        if (axis.max - axis.min) / axis.step * LINE <= pixels {
             return;
         }
         axis.step *= factor;
@@ -67,13 +81,10 @@ pub(super) fn legend_height(entries: &[LegendEntry], width: f64) -> f64 {
     ABOVE + ROW * grid(entries, width).1 as f64
 }
 
-/// The legend below a panel, its upper left corner at (left, top).
-pub(super) fn legend_below(
-    entries: &[LegendEntry],
-    [left, top]: [f64; 2],
-    width: f64,
-) -> Vec<Primitive> {
+/// The legend below a panel of a width, from `top` on: below its frame where it fits there.
+pub(super) fn legend_below(entries: &[LegendEntry], top: f64, width: f64) -> Vec<Primitive> {
     let (columns, _, column) = grid(entries, width);
+    let left = FRAME_LEFT.min((width - columns as f64 * column) / 2.0).max(0.0);
     let mut drawn = Vec::new();
     for (index, entry) in entries.iter().enumerate() {
         let x = left + column * (index % columns) as f64;
@@ -140,6 +151,6 @@ mod tests {
         let entries: Vec<LegendEntry> = (0..7).map(|_| entry("W = +1.0")).collect();
         let (columns, rows, column) = grid(&entries, 360.0);
         assert!(columns as f64 * column <= 360.0 && columns * rows >= 7, "{columns} x {rows}");
-        assert_eq!(legend_below(&entries, [0.0, 0.0], 360.0).len(), 14);
+        assert_eq!(legend_below(&entries, 0.0, 360.0).len(), 14);
     }
 }

@@ -39,7 +39,7 @@ pub(in crate::report) fn figure(
     let y = correlation_axis(statistics);
     let mut panels = Vec::new();
     if let Some(space) = space {
-        panels.push(distance_panel("(a) All pairs", &space.all, &y, "λ"));
+        panels.push(distance_panel("(a) All pairs", &space.all, &y, ("λ", format)));
     }
     if let Some(time) = &statistics.time {
         panels.push(time_panel(time, &y));
@@ -50,7 +50,7 @@ pub(in crate::report) fn figure(
             ("(d) Pairs along y (left)", "λy", &space.along_y),
         ] {
             if let Some(one) = one {
-                panels.push(distance_panel(name, one, &y, symbol));
+                panels.push(distance_panel(name, one, &y, (symbol, format)));
             }
         }
     }
@@ -102,7 +102,7 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }
 
-fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str) -> Panel {
+fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, (symbol, format): (&str, Format)) -> Panel {
     let farthest = of.classes.iter().map(|class| class.distance_m);
     let mut x = Axis::around("distance between drones (m)", farthest.chain([0.0]), 1.0);
     x.min = 0.0;
@@ -116,6 +116,13 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
         band(&mut panel, &of.classes);
     } else {
         violins(&mut panel, &of.classes, &x);
+    }
+    if format.is_print() {
+        for class in &of.classes {
+            let ends = class.correlations.first().zip(class.correlations.last());
+            let reach = ends.map(|(low, high)| [(class.distance_m, *low), (class.distance_m, *high)]);
+            panel.keep_clear(reach.as_ref().map_or(&[], |reach| reach.as_slice()));
+        }
     }
     let curve = |lambda: f64| -> Vec<(f64, f64)> {
         (0..=CURVE)

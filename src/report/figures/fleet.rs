@@ -65,7 +65,7 @@ pub(in crate::report) fn figure(
     let pitch = [cell_w, ASPECT * cell_w];
     let size = [pitch[0] * places.columns as f64, pitch[1] * places.rows as f64];
     let mut drawing =
-        Drawing::new(format, [format.width(), TOP + size[1].max(200.0) + 50.0]);
+        Drawing::new(format, [format.width(), TOP + size[1].max(format.choose(200.0, 150.0)) + 50.0]);
     let corner =
         |row: usize, column: usize| [LEFT + column as f64 * pitch[0], TOP + row as f64 * pitch[1]];
     if let Some(scale) = &scale {
@@ -81,7 +81,9 @@ pub(in crate::report) fn figure(
         let [x, y] = corner(places.rows - 1, 0);
         axes(&mut drawing, scale, [x, y, pitch[0] - gap, pitch[1] - gap]);
         let (beside, thick) = format.choose((22.0, 16.0), (10.0, 12.0));
-        let bar = [LEFT + size[0] + beside, TOP + 70.0, thick, (size[1] - 90.0).clamp(110.0, 320.0)];
+        let (above, least) = format.choose((70.0, 110.0), (44.0, 96.0));
+        let tall = (size[1] - above - 20.0).clamp(least, 320.0);
+        let bar = [LEFT + size[0] + beside, TOP + above, thick, tall];
         colour_bar(
             &mut drawing,
             bar,
@@ -218,7 +220,7 @@ fn cell(
         |slot| slot.to_string(),
     );
     let small = TextStyle {
-        size: (0.13 * w).clamp(6.0, 11.0),
+        size: drawing.format().text((0.13 * w).clamp(6.0, 11.0)),
         bold: false,
         colour: MUTED,
         anchor: Anchor::Start,

@@ -136,9 +136,11 @@ fn still(study: &StudyResult, format: Format) -> Option<Figure> {
     let inset = inset(&coloured);
     let sheet = if format.is_narrow() {
         // No room inside: it stands below.
-        let whole = [1040.0, 720.0];
-        let panels = [(panel, [0.0, 0.0, whole[0], 400.0]), (inset, [0.0, 400.0, 350.0, 250.0])];
-        Sheet::of(format, whole, panels.into())
+        let wide = format.width();
+        let mut sheet = Sheet::new(format, [wide, 640.0]);
+        sheet.place(panel, [0.0, 0.0, wide, 390.0]);
+        sheet.place(inset, [0.0, 390.0, wide, 250.0]);
+        sheet
     } else {
         let tall = format.choose(720.0, 560.0);
         let [wide, high] = [format.across(350.0), 250.0 * tall / 720.0];

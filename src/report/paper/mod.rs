@@ -3,20 +3,19 @@
 //! They are the report's figures, laid out for that width, so that their text has seven to nine points there. Other
 //! programs open them: they have no script, no style sheet but the font's, and no links.
 
+mod canonical;
 mod font;
 mod pdf;
 mod plain;
 
 use thiserror::Error;
 
-use super::format::Format;
+use super::format::{Format, PAGE_HEIGHT_MM};
 use super::{Beside, compare_page, gap_page, page};
 use crate::analysis::result::Analysis;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
 
-/// Height of the type area of a page, mm: nothing that is higher can be printed on one.
-const PAGE_HEIGHT_MM: f64 = 232.0;
 
 /// A figure that was drawn for a column, before it has its font.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,6 +4,7 @@ use svg2pdf::usvg::{ImageHrefResolver, Options, Tree};
 use svg2pdf::{ConversionOptions, PageOptions, to_pdf};
 
 use super::PaperError;
+use super::canonical::canonical;
 use super::font::{FAMILY, fonts};
 use crate::report::format::POINTS_PER_MM;
 
@@ -34,6 +35,8 @@ pub(super) fn height_mm(tree: &Tree) -> f64 {
 
 /// The page, of the size of the drawing.
 pub(super) fn pdf(name: &str, tree: &Tree) -> Result<Vec<u8>, PaperError> {
-    to_pdf(tree, ConversionOptions::default(), PageOptions { dpi: DPI })
-        .map_err(|error| PaperError::Pdf { name: name.to_owned(), reason: error.to_string() })
+    let failed = |reason: String| PaperError::Pdf { name: name.to_owned(), reason };
+    let made = to_pdf(tree, ConversionOptions::default(), PageOptions { dpi: DPI })
+        .map_err(|error| failed(error.to_string()))?;
+    canonical(&made).ok_or_else(|| failed("its objects are not as expected".to_owned()))
 }

@@ -57,7 +57,7 @@ pub(in crate::report) fn figure(verdict: &Verdict, format: Format) -> Option<Fig
     let (size, places) = format.arrange([1040.0, height], &on_page);
     let mut sheet = Sheet::new(format, size);
     let mut notes = Drawing::overlay(format);
-    key(&mut notes, [if format.is_narrow() { key_left(format, 0.0) } else { LEFT }, 14.0]);
+    key(&mut notes, [key_left(format, LEFT - 68.0), 14.0]);
     for (index, ((by, rows), at)) in shown.iter().zip(places).enumerate() {
         let scale = if by.is_of_drones() { &own } else { &shared };
         let letter = char::from(b'a' + index as u8);

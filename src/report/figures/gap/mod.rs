@@ -65,9 +65,13 @@ fn residuals(panel: &mut Panel, rows: &[&Regime], bar_width: f64, chance: bool) 
 /// Height of a [`key`], pixels.
 const KEY_HEIGHT: f64 = 28.0;
 
+/// Width of the key, pixels.
+const KEY_WIDTH: f64 = 384.0;
+
 /// Where the key starts above panels that start at `left` on the page, pixels.
 fn key_left(format: Format, left: f64) -> f64 {
-    if format.is_narrow() { 8.0 } else { format.across(left) + 68.0 }
+    let above = format.across(left) + 68.0;
+    format.choose(above, above.min(format.width() - KEY_WIDTH))
 }
 
 /// The legend of [`residuals`] in a strip above the panels, where no data is.
