@@ -11,6 +11,7 @@ use super::basemap_args::BasemapArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::origin::OriginChoice;
+use super::paper_args::PaperArgs;
 use super::shard_args::ShardArgs;
 use super::words;
 use super::zero::ZeroStretch;
@@ -29,6 +30,7 @@ use crate::workflow::basemap::shows_work;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{LevelWish, Work};
+use crate::workflow::paper::PaperFigures;
 
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
@@ -84,10 +86,12 @@ pub(super) struct AnalyzeArgs {
     #[arg(long)]
     no_report: bool,
     /// Analyse each campaign by itself, into its own folder; those that are done are not done again
-    #[arg(long, conflicts_with_all = ["csv", "output", "no_report", "basemap"])]
+    #[arg(long, conflicts_with_all = ["csv", "output", "no_report", "basemap", "paper_figures"])]
     each: bool,
     #[command(flatten)]
     basemap: BasemapArgs,
+    #[command(flatten)]
+    paper: PaperArgs,
     #[command(flatten)]
     sharing: ShardArgs,
     #[command(flatten)]
@@ -308,6 +312,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
     if let Some(indicator) = indicator {
         options.indicator = indicator.into();
     }
+    let paper = args.paper.wish()?;
     let basemap = args.basemap.read()?;
     if let Some((path, basemap)) = args.basemap.basemap.as_ref().zip(basemap.as_ref()) {
         shows_work(path, basemap, &work)?;
@@ -318,7 +323,8 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         None => Some(request.output()?),
     };
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
-    finish(context, &work, &options, args.hold.as_deref(), (output.as_deref(), basemap))
+    let wanted = Wanted { output: output.as_deref(), basemap, paper };
+    finish(context, &work, &options, args.hold.as_deref(), wanted)
 }
 
 /// Analyses a campaign into its own folder; the last step of `updraft run`.
@@ -326,10 +332,19 @@ pub(super) fn analyze_campaign(
     context: &Context,
     root: &Path,
     options: &AnalyzeOptions,
-    basemap: Option<Basemap>,
+    (basemap, paper): (Option<Basemap>, Option<PaperFigures>),
 ) -> Result<Exit, CommandError> {
     // What was just flown here.
-    finish(context, &simulated(root)?, options, None, (Some(root), basemap))
+    let wanted = Wanted { output: Some(root), basemap, paper };
+    finish(context, &simulated(root)?, options, None, wanted)
+}
+
+/// What is made of an analysis beside what is printed.
+struct Wanted<'a> {
+    /// Folder of numbers and report, if they are written.
+    output: Option<&'a Path>,
+    basemap: Option<Basemap>,
+    paper: Option<PaperFigures>,
 }
 
 /// Analyses, and prints what came of it.
@@ -338,7 +353,7 @@ fn finish(
     work: &Work,
     options: &AnalyzeOptions,
     hold: Option<&Path>,
-    (output, basemap): (Option<&Path>, Option<Basemap>),
+    Wanted { output, basemap, paper }: Wanted<'_>,
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
     let settings = options.settings();
@@ -354,6 +369,9 @@ fn finish(
         context.print(&terminal_summary(analysis, width, context.color))?;
     }
     let page = output.map(|folder| analysed.write(context, folder)).transpose()?.flatten();
+    if let Some(paper) = &paper {
+        analysed.print(context, paper)?;
+    }
     let nothing = analysed.is_nothing();
     if context.json && !nothing {
         let schema = "updraft.analyze/1";

@@ -6,11 +6,13 @@ use clap::{Args, ValueEnum};
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::paper_args::PaperArgs;
 use crate::base::plain::Shown as _;
 use crate::compare::LawChoice;
 use crate::report;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::compare::{Request, run as compare};
+use crate::workflow::paper::Shown;
 
 /// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
@@ -43,6 +45,8 @@ pub(super) struct CompareArgs {
     /// Which law is compared
     #[arg(long, value_enum, default_value_t = Law::Preferred)]
     law: Law,
+    #[command(flatten)]
+    paper: PaperArgs,
 }
 
 /// Which law is compared.
@@ -67,6 +71,7 @@ pub(super) fn run(context: &Context, args: &CompareArgs) -> Result<Exit, Command
         },
         output: args.output.clone(),
     };
+    let paper = args.paper.wish()?;
     let compared = compare(context, &request)?;
     if context.json {
         context.print_json(&compared.comparison)?;
@@ -74,6 +79,9 @@ pub(super) fn run(context: &Context, args: &CompareArgs) -> Result<Exit, Command
         let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
         let text = report::comparison_summary(&compared.comparison, width, context.color);
         context.print(&text)?;
+    }
+    if let Some(paper) = &paper {
+        paper.write(context, Shown::Comparison(&compared.comparison))?;
     }
     if let Some(page) = &compared.page {
         context.result(page)?;

@@ -24,6 +24,7 @@ mod logs;
 mod manual;
 mod mission_args;
 mod origin;
+mod paper_args;
 mod physics;
 mod plan;
 mod progress;

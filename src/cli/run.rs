@@ -11,6 +11,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
+use super::paper_args::PaperArgs;
 use super::simulate::{AirArgs, AirSpecs, air_help, air_specs, speed, updraft};
 use crate::workflow::basemap::shows_a_plan;
 use crate::workflow::clock::Stopwatch;
@@ -79,6 +80,8 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     basemap: BasemapArgs,
     #[command(flatten)]
+    paper: PaperArgs,
+    #[command(flatten)]
     hide: HideArgs,
     #[command(flatten)]
     air: AirArgs,
@@ -100,6 +103,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     }
     let watch = Stopwatch::start(context);
     let run = args.campaign()?;
+    let paper = args.paper.wish()?;
     let basemap = args.basemap.read()?;
     if let Some((path, basemap)) = args.basemap.basemap.as_ref().zip(basemap.as_ref()) {
         shows_a_plan(path, basemap, run.mission.flights.iter().map(|flight| &flight.plan))?;
@@ -109,7 +113,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         return Ok(Exit::Unsafe);
     }
     let options = AnalyzeOptions::of_run(args.estimate.plain);
-    let exit = analyze_campaign(context, &args.output, &options, basemap)?;
+    let exit = analyze_campaign(context, &args.output, &options, (basemap, paper))?;
     context.say(&format!("Done in {watch}"));
     Ok(if flown.ending == Ending::Losses { Exit::Losses } else { exit })
 }

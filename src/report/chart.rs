@@ -12,7 +12,9 @@ use kuva::render::theme::Theme;
 
 use super::axis::Axis;
 use super::colour::{INK, RULE};
+use super::format::Format;
 use super::legend::{self, Corner, Inked};
+use super::print_panel::{fitting, legend_below, legend_height, title, with_room_between, with_room_for_labels};
 use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
@@ -27,6 +29,8 @@ const BAR_MARGIN: f64 = 62.0;
 const LEFT_MARGIN: f64 = 66.0;
 const TOP_MARGIN: f64 = 30.0;
 const BOTTOM_MARGIN: f64 = 46.0;
+/// Size of its title, pixels.
+const TITLE: u32 = 14;
 
 /// Where the frame of a panel of a size lies in it, [x, y, width, height], pixels; `room_right`: with
 /// [`Panel::leave_room_right`].
@@ -67,6 +71,7 @@ pub(super) struct Panel {
     legend_box: bool,
     inked: Inked,
     right_margin: f64,
+    settled: bool,
 }
 
 impl Panel {
@@ -86,6 +91,7 @@ impl Panel {
             legend_box: true,
             inked: Inked::default(),
             right_margin: RIGHT_MARGIN,
+            settled: false,
         }
     }
 
@@ -173,14 +179,34 @@ impl Panel {
         self.front_shapes.push(shape);
     }
 
+    /// Keeps the legend off a line that a shape draws.
+    pub(super) fn keep_clear(&mut self, points: &[(f64, f64)]) {
+        self.inked.line(points);
+    }
+
     /// A logarithmic x axis.
     pub(super) fn logarithmic_x(&mut self) {
         self.log_x = true;
     }
 
     /// Draws the panel into a scene of this size, pixels.
-    pub(super) fn draw(mut self, width: f64, height: f64) -> Scene {
-        self.place_legend(width, height);
+    pub(super) fn draw(mut self, format: Format, [width, height]: [f64; 2]) -> Scene {
+        let below = self.legend_below(format, [width, height]);
+        let room = if below.is_empty() { 0.0 } else { legend_height(&below, width) };
+        let legend_top = height - room;
+        let height = legend_top;
+        let mut title_at = (self.title.clone(), LEFT_MARGIN);
+        if format.is_print() {
+            let frame = width - LEFT_MARGIN - self.right_margin;
+            if !self.log_x {
+                with_room_for_labels(&mut self.x, frame);
+            }
+            self.x.label = fitting(&self.x.label, 2.0 * (width - LEFT_MARGIN - frame / 2.0));
+            self.y.label = fitting(&self.y.label, height);
+            with_room_between(&mut self.y, height - TOP_MARGIN - BOTTOM_MARGIN);
+            title_at = title(&self.title, LEFT_MARGIN, width, f64::from(TITLE));
+        }
+        self.settle([width, height]);
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
             .with_width(width)
             .with_height(height)
@@ -214,41 +240,76 @@ impl Panel {
         let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
         scene.elements.extend(front);
         scene.elements.push(Primitive::Text {
-            x: LEFT_MARGIN,
+            x: title_at.1,
             y: 17.0,
-            content: self.title,
-            size: 14,
+            content: title_at.0,
+            size: TITLE,
             anchor: TextAnchor::Start,
             rotate: None,
             bold: true,
             color: None,
         });
+        scene.elements.extend(legend_below(&below, legend_top, width));
         scene
+    }
+
+    /// The ranges of x and y that are drawn in a panel of a size, once there is room for the legend.
+    pub(super) fn ranges(&mut self, size: [f64; 2]) -> [[f64; 2]; 2] {
+        self.settle(size);
+        [[self.x.min, self.x.max], [self.y.min, self.y.max]]
     }
 }
 
 impl Panel {
+    /// The entries of a legend that is drawn below a panel in print: there is no room beside it, or no free corner in
+    /// it, and axes do not grow for it there.
+    fn legend_below(&mut self, format: Format, size: [f64; 2]) -> Vec<LegendEntry> {
+        if !format.is_print() || self.settled || self.legend.is_empty() {
+            return Vec::new();
+        }
+        if matches!(self.legend_position, LegendPosition::OutsideRightTop) {
+            if !format.is_narrow() {
+                return Vec::new();
+            }
+            self.right_margin = RIGHT_MARGIN;
+            return std::mem::take(&mut self.legend);
+        }
+        match Corner::of(self.legend_position) {
+            Some(wanted) if self.free_corner(wanted, size).1 > 0 => {
+                std::mem::take(&mut self.legend)
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The corner that has the least behind the legend, and how many points are there.
+    fn free_corner(&self, wanted: Corner, [width, height]: [f64; 2]) -> (Corner, usize) {
+        let labels: Vec<&str> = self.legend.iter().map(|entry| entry.label.as_str()).collect();
+        let frame = [width - LEFT_MARGIN - self.right_margin, height - TOP_MARGIN - BOTTOM_MARGIN];
+        let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
+        let place = |[at_x, at_y]: [f64; 2]| {
+            let (x, y) = (&self.x, &self.y);
+            let across = if self.log_x {
+                share(at_x.ln(), x.min.ln(), x.max.ln())
+            } else {
+                share(at_x, x.min, x.max)
+            };
+            [across, 1.0 - share(at_y, y.min, y.max)]
+        };
+        legend::corner(&self.inked, wanted, legend::size(&labels), frame, place)
+    }
+
     /// Moves a legend off the data: to a free corner, else with more room at the top.
-    fn place_legend(&mut self, width: f64, height: f64) {
+    fn settle(&mut self, [width, height]: [f64; 2]) {
+        if std::mem::replace(&mut self.settled, true) {
+            return;
+        }
         let Some(mut corner) = Corner::of(self.legend_position).filter(|_| !self.legend.is_empty())
         else {
             return;
         };
-        let labels: Vec<&str> = self.legend.iter().map(|entry| entry.label.as_str()).collect();
-        let size = legend::size(&labels);
-        let frame = [width - LEFT_MARGIN - self.right_margin, height - TOP_MARGIN - BOTTOM_MARGIN];
         for _ in 0..MOST_ROOM {
-            let (x, y, log_x) = (&self.x, &self.y, self.log_x);
-            let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
-            let place = |[at_x, at_y]: [f64; 2]| {
-                let across = if log_x {
-                    share(at_x.ln(), x.min.ln(), x.max.ln())
-                } else {
-                    share(at_x, x.min, x.max)
-                };
-                [across, 1.0 - share(at_y, y.min, y.max)]
-            };
-            let (free, covered) = legend::corner(&self.inked, corner, size, frame, place);
+            let (free, covered) = self.free_corner(corner, [width, height]);
             corner = free;
             self.legend_position = corner.position();
             if covered == 0 {

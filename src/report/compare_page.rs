@@ -10,6 +10,7 @@ use crate::compare::result::{
 use super::compare_terminal::title;
 use super::compare_words as words;
 use super::figures::compare::{drones, laws, maps, structure};
+use super::format::Format;
 use super::fill::{common, fill};
 use super::text::{NONE, clean, count, estimate, slug, unit};
 use super::{Figure, Provenance, Report, ReportError};
@@ -25,17 +26,31 @@ pub fn render_comparison(
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
     let mut figures = Figures::default();
+    let values = values(comparison, provenance, &mut figures);
+    let html = fill("compare.html", PAGE, values)?;
+    Ok(Report { html, figures: figures.files, data: Vec::new() })
+}
+
+/// The figures alone, drawn for a format.
+#[cfg(any(feature = "paper-figures", test))]
+pub(super) fn figures(comparison: &Comparison, format: Format) -> Vec<(String, String)> {
+    let mut figures = Figures { format, ..Figures::default() };
+    values(comparison, &Provenance::default(), &mut figures);
+    figures.files
+}
+
+fn values(comparison: &Comparison, provenance: &Provenance, figures: &mut Figures) -> Value {
     let laws: Vec<Value> = comparison
         .laws
         .iter()
         .enumerate()
-        .map(|(index, law)| law_section(law, index, &mut figures))
+        .map(|(index, law)| law_section(law, index, figures))
         .collect();
     let maps: Vec<Value> = comparison
         .maps
         .iter()
         .enumerate()
-        .map(|(index, map)| map_section(comparison, map, index, &mut figures))
+        .map(|(index, map)| map_section(comparison, map, index, figures))
         .collect();
     let campaigns: Vec<Value> = comparison
         .campaigns
@@ -52,7 +67,7 @@ pub fn render_comparison(
         .collect();
     let cleaned = |items: &[String]| items.iter().map(|item| clean(item)).collect::<Vec<_>>();
     let ids: Vec<String> = comparison.campaigns.iter().map(|one| clean(&one.id)).collect();
-    let values = context! {
+    context! {
         title => title(&ids),
         verdict => verdict(comparison),
         tiles => tiles(comparison),
@@ -64,14 +79,14 @@ pub fn render_comparison(
         notes => cleaned(&comparison.notes),
         schema => clean(&comparison.schema),
         ..common(provenance),
-    };
-    let html = fill("compare.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files, data: Vec::new() })
+    }
 }
 
 /// Figures, numbered in the order in which they are shown.
 #[derive(Default)]
 struct Figures {
+    /// What they are drawn for.
+    format: Format,
     files: Vec<(String, String)>,
 }
 
@@ -154,7 +169,7 @@ fn law_section(law: &LawComparison, index: usize, figures: &mut Figures) -> Valu
             }
         })
         .collect();
-    let shown = [figures.show(laws::figure(law, &key)), figures.show(drones::figure(law, &key))];
+    let shown = [figures.show(laws::figure(law, &key, figures.format)), figures.show(drones::figure(law, &key, figures.format))];
     context! {
         heading => words::pair(&law.pair),
         law => clean(&law.law),
@@ -216,8 +231,8 @@ fn map_section(
         .collect();
     let correlations = comparison.structures.iter().find(|one| one.pair == map.pair);
     let shown = [
-        figures.show(maps::figure(map, &key)),
-        figures.show(correlations.and_then(|one| structure::figure(one, &key))),
+        figures.show(maps::figure(map, &key, figures.format)),
+        figures.show(correlations.and_then(|one| structure::figure(one, &key, figures.format))),
     ];
     context! {
         heading => words::pair(&map.pair),

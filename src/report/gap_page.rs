@@ -7,6 +7,7 @@ use minijinja::value::Value;
 use crate::gap::Verdict;
 
 use super::figures::gap::{drones, ladder, map};
+use super::format::Format;
 use super::fill::{OPEN_LIMIT, common, fill};
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
@@ -24,15 +25,29 @@ const PAGE: &str = include_str!("../../templates/report/gap.html");
 /// [`ReportError::Page`], a bug of this program.
 pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, ReportError> {
     let mut figures = Gallery::default();
-    let map = map::figure(verdict).map(|figure| figures.show(figure));
-    let ladder = ladder::figure(verdict).map(|figure| figures.show(figure));
+    let values = values(verdict, provenance, &mut figures);
+    let html = fill("gap.html", PAGE, values)?;
+    Ok(Report { html, figures: figures.files, data: Vec::new() })
+}
+
+/// The figures alone, drawn for a format.
+#[cfg(any(feature = "paper-figures", test))]
+pub(super) fn figures(verdict: &Verdict, format: Format) -> Vec<(String, String)> {
+    let mut figures = Gallery::of(format);
+    values(verdict, &Provenance::default(), &mut figures);
+    figures.files
+}
+
+fn values(verdict: &Verdict, provenance: &Provenance, figures: &mut Gallery) -> Value {
+    let map = map::figure(verdict, figures.format).map(|figure| figures.show(figure));
+    let ladder = ladder::figure(verdict, figures.format).map(|figure| figures.show(figure));
     let steps: Vec<Value> = verdict
         .steps
         .iter()
         .enumerate()
-        .map(|(index, step)| step_section(step, index + 1, &mut figures))
+        .map(|(index, step)| step_section(step, index + 1, figures))
         .collect();
-    let scatter = drones::figure(verdict).map(|figure| figures.show(figure));
+    let scatter = drones::figure(verdict, figures.format).map(|figure| figures.show(figure));
     let groups: Vec<String> = verdict
         .data
         .groups
@@ -47,7 +62,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
     slots.sort_unstable();
     let held_out: Vec<String> = slots.iter().map(u16::to_string).collect();
     let rest = &verdict.rest;
-    let values = context! {
+    context! {
         title => format!("Measurement and model: {}", clean(&verdict.vehicle)),
         vehicle => clean(&verdict.vehicle),
         summary => micro(&verdict.summary),
@@ -80,9 +95,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         made_by => clean(&verdict.made_by),
         seed => provenance.seed.map(|seed| seed.to_string()),
         ..common(provenance),
-    };
-    let html = fill("gap.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files, data: Vec::new() })
+    }
 }
 
 /// What is said, as sentences of a page.

@@ -93,7 +93,7 @@ pub(super) fn regime_rows(verdict: &Verdict) -> Vec<Value> {
 
 /// One thing that was found.
 pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery) -> Value {
-    let figure = step::figure(found, number_of).map(|figure| figures.show(figure));
+    let figure = step::figure(found, number_of, figures.format).map(|figure| figures.show(figure));
     let effects: Vec<Value> = found.finding.effects().into_iter().map(described).collect();
     let parameters = match &found.finding {
         Finding::Name { parameters, .. } | Finding::Class { parameters, .. } => {

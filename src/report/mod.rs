@@ -30,6 +30,7 @@ mod figures;
 mod fill;
 mod film;
 mod fleet_air;
+mod format;
 mod frames;
 mod gap_page;
 mod gap_parts;
@@ -47,8 +48,11 @@ mod opening;
 mod page;
 mod page_air;
 mod page_flight;
+#[cfg(feature = "paper-figures")]
+pub mod paper;
 mod posterior;
 mod posterior_grid;
+mod print_panel;
 mod raster;
 mod scales;
 mod sensitivity_page;
@@ -161,6 +165,13 @@ struct Figure {
     /// Caption: what the figure shows, in full sentences.
     caption: String,
     svg: String,
+}
+
+impl Figure {
+    /// A figure that cannot be read at the width that was asked for: it has no drawing.
+    fn too_wide(name: String, title: String) -> Self {
+        Self { name, title, caption: String::new(), svg: String::new() }
+    }
 }
 
 /// Renders the page and the figures of an analysis.

@@ -9,6 +9,7 @@ use crate::study::result::StudyResult;
 use super::cite::citation;
 use super::explorer::Explorer;
 use super::figures::{laws as figure_laws, study as figure_study};
+use super::format::Format;
 use super::fill::{OPEN_LIMIT, STYLE, common, fill};
 use super::opening::Opening;
 use super::page_air::air_section;
@@ -37,26 +38,50 @@ pub(super) fn render(
     beside: Beside<'_>,
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
-    let Beside { study, basemap } = beside;
     let mut figures = Gallery::default();
+    let values = values(analysis, beside, provenance, &mut figures);
+    let html = fill("report.html", PAGE, values)?;
+    Ok(Report { html, figures: figures.files, data: figures.data })
+}
+
+/// The figures of the report alone, drawn for a format.
+#[cfg(any(feature = "paper-figures", test))]
+pub(super) fn figures(
+    analysis: &Analysis,
+    beside: Beside<'_>,
+    format: Format,
+) -> Vec<(String, String)> {
+    let mut figures = Gallery::of(format);
+    values(analysis, beside, &Provenance::default(), &mut figures);
+    figures.files
+}
+
+/// All that the page shows; the figures among it are put into `figures`, too.
+fn values(
+    analysis: &Analysis,
+    beside: Beside<'_>,
+    provenance: &Provenance,
+    figures: &mut Gallery,
+) -> Value {
+    let Beside { study, basemap } = beside;
     let air: Vec<Value> = analysis
         .flights
         .iter()
         .enumerate()
-        .filter_map(|(index, flight)| air_section(analysis, flight, index, basemap, &mut figures))
+        .filter_map(|(index, flight)| air_section(analysis, flight, index, basemap, figures))
         .collect();
-    let laws = figure_laws::figure(analysis).map(|figure| figures.show(figure));
-    let study = study.map(|study| study_section(study, &mut figures));
+    let laws = figure_laws::figure(analysis, figures.format).map(|figure| figures.show(figure));
+    let study = study.map(|study| study_section(study, figures));
     let flights: Vec<Value> = analysis
         .flights
         .iter()
         .enumerate()
-        .map(|(index, flight)| flight_section(analysis, flight, index, &mut figures))
+        .map(|(index, flight)| flight_section(analysis, flight, index, figures))
         .collect();
     let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(&w.to_string())).collect();
     let title = clean(&analysis.title);
     let title = if title.trim().is_empty() { "Updraft report".to_owned() } else { title };
-    let values = context! {
+    context! {
         opening => Opening::of(analysis).value(),
         cite => citation(analysis, &title, provenance),
         title,
@@ -74,23 +99,29 @@ pub(super) fn render(
         study,
         flights,
         ..common(provenance),
-    };
-    let html = fill("report.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files, data: figures.data })
+    }
 }
 
 /// Names the figures of the page as their files are named, and collects the files.
 #[derive(Default)]
 pub(super) struct Gallery {
+    /// What they are drawn for.
+    pub(super) format: Format,
     pub(super) files: Vec<(String, String)>,
     /// Files of data beside the page.
     data: Vec<(String, String)>,
 }
 
 impl Gallery {
+    /// An empty one of figures for a format.
+    #[cfg(any(feature = "paper-figures", test))]
+    pub(super) fn of(format: Format) -> Self {
+        Self { format, ..Self::default() }
+    }
+
     /// Keeps the files of interactive parts; what their template gets.
     pub(super) fn explore(&mut self, explorer: Option<Explorer>) -> Option<Value> {
-        let Explorer { values, files } = explorer?;
+        let Explorer { values, files } = explorer.filter(|_| !self.format.is_print())?;
         self.data.extend(files);
         Some(values)
     }
@@ -130,7 +161,7 @@ pub(super) fn label(name: &str) -> &str {
 
 /// The paper's Fig. 2 and Table I, from the study that the campaign holds.
 fn study_section(study: &StudyResult, figures: &mut Gallery) -> Value {
-    let shown: Vec<Value> = figure_study::figures(study)
+    let shown: Vec<Value> = figure_study::figures(study, figures.format)
         .into_iter()
         .filter(|figure| figure.name == figure_study::FIG2)
         .map(|figure| figures.show(figure))

@@ -36,8 +36,10 @@ pub(super) fn air_section(
     let key = flight_key(analysis, index);
     let frames = Frames::of(map);
     let field = GridField::of(map);
-    let drawn =
-        |means, basemap| figure_map::mean_map(analysis, (flight, &key), map, means, basemap);
+    let format = figures.format;
+    let drawn = |means, basemap| {
+        figure_map::mean_map(analysis, (flight, &key), map, means, basemap, format)
+    };
     let together = map.posterior.as_ref().and_then(|_| drawn(Means::Posterior, basemap));
     // One picture is enough for a page.
     let alone = drawn(Means::Alone, basemap.filter(|_| together.is_none()));
@@ -65,7 +67,7 @@ pub(super) fn air_section(
     let explored = figures.explore(explorer(flight, &key, frames.as_ref(), film_shown));
     let still = |field: Option<&GridField<'_>>| {
         let frames = frames.as_ref()?;
-        evolution::figure(flight, &key, frames, wind(flight), field)
+        evolution::figure(flight, &key, frames, wind(flight), field, format)
     };
     let (still, still_alone) = match &field {
         Some(field) => (still(Some(field)), still(None)),
@@ -81,11 +83,12 @@ pub(super) fn air_section(
                 frames,
                 field,
                 figure_map::scale_of(map, Means::Posterior),
+                format,
             )
         }),
-        track::figure(flight, &key, map),
-        air::figure(flight, &key, map),
-        levelled::figure(flight, &key, map),
+        track::figure(flight, &key, map, format),
+        air::figure(flight, &key, map, format),
+        levelled::figure(flight, &key, map, format),
     ]
     .into_iter()
     .flatten()
@@ -101,12 +104,12 @@ pub(super) fn air_section(
         Some("No drone gave an estimate of the vertical air speed.")
     };
     let statistics = flight.statistics.as_ref().map(|found| {
-        let correlations = correlation::figure(flight, &key, found).map(|f| figures.show(f));
+        let correlations = correlation::figure(flight, &key, found, format).map(|f| figures.show(f));
         let averaging = found
             .averaging
             .as_ref()
             .and_then(|averaging| {
-                averaging::figure(flight, &key, averaging, found.baseline.as_ref())
+                averaging::figure(flight, &key, averaging, found.baseline.as_ref(), format)
             })
             .map(|figure| figures.show(figure));
         context! { correlations, averaging, ..scales::section(found) }

@@ -56,7 +56,7 @@ pub(super) fn flight_section(
         })
         .collect();
     let fleet = (flight.purpose == Purpose::Calibration)
-        .then(|| fleet::figure(analysis, flight, &key, &names))
+        .then(|| fleet::figure(analysis, flight, &key, &names, figures.format))
         .flatten()
         .map(|figure| figures.show_linked(figure));
     // Numbered after the fleet, below which it stands.
@@ -170,9 +170,10 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
     let mut shown = None;
     let undrawn = flight.drones.len() - wanted.len();
     let mut left_out = 0;
+    let format = figures.format;
     let drawn: Vec<(usize, Option<Figure>)> = wanted
         .into_par_iter()
-        .map(|index| (index, figure_drone::figure(flight, key, index, &axes)))
+        .map(|index| (index, figure_drone::figure(flight, key, index, &axes, format)))
         .collect();
     for (index, figure) in drawn {
         let (Some(drone), Some(figure)) = (flight.drones.get(index), figure) else { continue };
@@ -183,7 +184,7 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
         };
         let is_first = index == first;
         bytes += figure.svg.len();
-        let inside = bytes <= DRONE_FIGURE_BYTES || is_first;
+        let inside = bytes <= DRONE_FIGURE_BYTES || is_first || format.is_print();
         if inside {
             choices.push(context! {
                 label,
@@ -191,7 +192,7 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
                 name => figure.name.clone(),
                 first => is_first,
             });
-            if !is_first {
+            if !is_first && !format.is_print() {
                 inside_page.insert(figure.name.clone(), figure.svg.clone());
             }
         } else {

@@ -6,6 +6,7 @@ use minijinja::value::Value;
 use crate::study::sensitivity::{Influence, OutcomeResult, SensitivityResult};
 
 use super::figures::sensitivity::figures;
+use super::format::Format;
 use super::fill::{common, fill};
 use super::page::label;
 use super::sensitivity_terminal::{
@@ -30,7 +31,7 @@ pub fn render_sensitivity(
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
     let is_sobol = study.design == "sobol";
-    let figures = figures(study, points);
+    let figures = figures(study, points, Format::PAGE);
     let shown: Vec<Value> = figures
         .iter()
         .map(|figure| {

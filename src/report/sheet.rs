@@ -5,34 +5,51 @@ use std::fmt::Write as _;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::render::{PathData, Primitive, Scene};
 
+use super::chart::Panel;
 use super::colour::INK;
+use super::format::Format;
 use super::svg::{Drawing, escape};
 use super::text::clean;
 
 /// Font of figures; all are found on the reader's machine or replaced there.
 pub(super) const FONT: &str =
     "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif";
+/// Font of figures for print, which goes with them.
+pub(super) const PRINT_FONT: &str = "'Noto Sans', sans-serif";
 
 /// Prefix of the clip ids that `kuva` numbers through the whole process.
 const KUVA_CLIP: &str = "kuva-clip-";
 
 /// A drawing that panels are put on.
 pub(super) struct Sheet {
+    format: Format,
     scene: Scene,
     overlay: String,
 }
 
 impl Sheet {
     /// An empty white sheet, pixels.
-    pub(super) fn new(width: f64, height: f64) -> Self {
+    pub(super) fn new(format: Format, [width, height]: [f64; 2]) -> Self {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONT.to_owned());
         scene.text_color = Some(INK.to_owned());
-        Self { scene, overlay: String::new() }
+        Self { format, scene, overlay: String::new() }
     }
 
-    /// Puts a panel at (x, y).
-    pub(super) fn place(&mut self, panel: Scene, x: f64, y: f64) {
+    /// A sheet with these panels; each has its place on a sheet of the page: [x, y, width, height].
+    pub(super) fn of(format: Format, page: [f64; 2], panels: Vec<(Panel, [f64; 4])>) -> Self {
+        let (panels, on_page): (Vec<Panel>, Vec<[f64; 4]>) = panels.into_iter().unzip();
+        let (size, places) = format.arrange(page, &on_page);
+        let mut sheet = Self::new(format, size);
+        for (panel, place) in panels.into_iter().zip(places) {
+            sheet.place(panel, place);
+        }
+        sheet
+    }
+
+    /// Draws a panel at [x, y, width, height].
+    pub(super) fn place(&mut self, panel: Panel, [x, y, width, height]: [f64; 4]) {
+        let panel = panel.draw(self.format, [width, height]);
         self.scene.defs.extend(panel.defs);
         self.scene.elements.push(Primitive::GroupStart {
             transform: Some(format!("translate({x},{y})")),
@@ -64,7 +81,7 @@ impl Sheet {
     pub(super) fn svg(&self, name: &str, title: &str) -> String {
         let drawn = SvgBackend::new().render_scene(&self.scene);
         let body = drawn.split_once('>').map_or("", |(_, body)| body);
-        let head = svg_head(self.scene.width, self.scene.height, title);
+        let head = svg_head(self.format, [self.scene.width, self.scene.height], title);
         let tidy = tidied(&renumbered(body, name));
         // The overlay is tidy by itself, and its pictures hold digits that are no coordinates.
         let inner = tidy.trim_end().strip_suffix("</svg>").unwrap_or(&tidy);
@@ -73,12 +90,12 @@ impl Sheet {
 }
 
 /// Opening tag and title of a figure.
-pub(super) fn svg_head(width: f64, height: f64, title: &str) -> String {
+pub(super) fn svg_head(format: Format, [width, height]: [f64; 2], title: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" role=\"img\" font-family=\"{}\" fill=\"{INK}\">\
-         <title>{}</title>",
-        escape(FONT),
+         {} role=\"img\" font-family=\"{}\" fill=\"{INK}\"><title>{}</title>",
+        format.lengths([width, height]),
+        escape(format.choose(FONT, PRINT_FONT)),
         escape(&clean(title)),
     )
 }

@@ -7,6 +7,7 @@ use crate::study::paper;
 use crate::study::result::StudyResult;
 
 use super::figures::study::{self as figure_study, rho};
+use super::format::Format;
 use super::fill::{common, fill};
 use super::page::label;
 use super::study_terminal::{ConditionWords, range_rows, windows};
@@ -20,7 +21,7 @@ const PAGE: &str = include_str!("../../templates/report/study.html");
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.
 pub fn render_study(study: &StudyResult, provenance: &Provenance) -> Result<Report, ReportError> {
-    let figures = figure_study::figures(study);
+    let figures = figure_study::figures(study, Format::PAGE);
     let shown: Vec<Value> = figures
         .iter()
         .map(|figure| {

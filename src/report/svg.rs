@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::format::Format;
 use super::sheet::svg_head;
 use super::text::clean;
 
@@ -43,6 +44,7 @@ pub(super) struct TextStyle<'a> {
 
 /// A drawing being written, pixels, y down.
 pub(super) struct Drawing {
+    format: Format,
     width: f64,
     height: f64,
     body: String,
@@ -50,8 +52,8 @@ pub(super) struct Drawing {
 
 impl Drawing {
     /// An empty white drawing.
-    pub(super) fn new(width: f64, height: f64) -> Self {
-        let mut drawing = Self { width, height, body: String::new() };
+    pub(super) fn new(format: Format, [width, height]: [f64; 2]) -> Self {
+        let mut drawing = Self { format, width, height, body: String::new() };
         drawing.rect([0.0, 0.0, width, height], "#ffffff", "");
         drawing
     }
@@ -105,7 +107,8 @@ impl Drawing {
         let _ = write!(
             self.body,
             "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{:.1}\" text-anchor=\"{anchor}\" fill=\"{}\"",
-            style.size, style.colour,
+            self.format.text(style.size),
+            style.colour,
         );
         if style.bold {
             self.body.push_str(" font-weight=\"600\"");
@@ -114,6 +117,11 @@ impl Drawing {
             let _ = write!(self.body, " transform=\"rotate({turn_deg} {x:.1} {y:.1})\"");
         }
         let _ = write!(self.body, ">{}</text>", escape(&clean(text)));
+    }
+
+    /// What it is drawn for.
+    pub(super) fn format(&self) -> Format {
+        self.format
     }
 
     /// An element of our own making.
@@ -138,8 +146,8 @@ impl Drawing {
     }
 
     /// A drawing without a ground of its own, to be laid over another.
-    pub(super) fn overlay() -> Self {
-        Self { width: 0.0, height: 0.0, body: String::new() }
+    pub(super) fn overlay(format: Format) -> Self {
+        Self { format, width: 0.0, height: 0.0, body: String::new() }
     }
 
     /// What was drawn, without the outer element.
@@ -149,6 +157,6 @@ impl Drawing {
 
     /// The whole SVG; `title` is read aloud.
     pub(super) fn finish(self, title: &str) -> String {
-        format!("{}{}</svg>", svg_head(self.width, self.height, title), self.body)
+        format!("{}{}</svg>", svg_head(self.format, [self.width, self.height], title), self.body)
     }
 }

@@ -51,6 +51,7 @@ pub mod host;
 pub(crate) mod live;
 pub mod mission;
 mod pages;
+pub mod paper;
 pub mod physics;
 pub mod plan;
 mod provenance;

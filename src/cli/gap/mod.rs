@@ -11,11 +11,13 @@ use serde::Serialize;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::origin::OriginChoice;
+use super::paper_args::PaperArgs;
 use super::words;
 use crate::base::plain::Shown as _;
 use crate::gap::{Options, Verdict};
 use crate::report;
 use crate::workflow::gap::{self, Compared, Request};
+use crate::workflow::paper::Shown;
 
 /// Arguments of `updraft gap`.
 #[derive(Debug, Args)]
@@ -76,6 +78,8 @@ pub(super) struct GapArgs {
     /// Seed for everything random
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    paper: PaperArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -109,6 +113,7 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     if let Some(GapCommand::Next(args)) = &args.command {
         return next::run(context, args);
     }
+    let paper = args.paper.wish()?;
     let compared = gap::run(context, &args.request())?;
     let Compared { verdict, model, page } = &compared;
     if context.json {
@@ -118,6 +123,9 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         let width =
             context.width.map_or(report::NO_EDGE, |columns| columns.clamp(MIN_WIDTH, WIDTH));
         context.print(&report::gap_summary(verdict, width, context.color))?;
+    }
+    if let Some(paper) = &paper {
+        paper.write(context, Shown::Verdict(verdict))?;
     }
     context.result(page)?;
     context.say(&format!(

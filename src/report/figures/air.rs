@@ -10,6 +10,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, GREEN, VERMILLION};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, usable};
 
@@ -73,6 +74,7 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     map: &UpdraftMap,
+    format: Format,
 ) -> Option<Figure> {
     let instants = instants(map);
     if instants.len() < 2 {
@@ -120,9 +122,8 @@ pub(in crate::report) fn figure(
         );
     }
     let side = truth_panel(map);
-    let mut sheet = Sheet::new(1040.0, 380.0);
     let wide = if side.is_some() { 620.0 } else { 1040.0 };
-    sheet.place(panel.draw(wide, 380.0), 0.0, 0.0);
+    let mut panels = vec![(panel, [0.0, 0.0, wide, 380.0])];
     let mut caption = if single {
         "(a) Running 10 s estimates.".to_owned()
     } else {
@@ -141,7 +142,7 @@ pub(in crate::report) fn figure(
         });
     }
     if let Some(side) = side {
-        sheet.place(side.draw(410.0, 380.0), 630.0, 0.0);
+        panels.push((side, [630.0, 0.0, 410.0, 380.0]));
         caption.push_str(
             " (b) Each drone's mean over the hover, with its standard error, against the true \
              mean at its place; on the dashed line they agree.",
@@ -150,6 +151,7 @@ pub(in crate::report) fn figure(
     if map.is_scan() {
         caption.push_str(" The drones moved: hover and place are their tracks here.");
     }
+    let sheet = Sheet::of(format, [1040.0, 380.0], panels);
     let name = format!("air-{key}");
     let title = format!("Vertical air speed over time, {}", clean(&flight.name));
     Some(Figure { svg: sheet.svg(&name, &title), name, title, caption })

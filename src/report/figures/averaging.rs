@@ -8,6 +8,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, MUTED, VERMILLION};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, fixed, sentence, usable};
 
@@ -17,6 +18,7 @@ pub(in crate::report) fn figure(
     key: &str,
     averaging: &Averaging,
     baseline: Option<&Baseline>,
+    format: Format,
 ) -> Option<Figure> {
     let points: Vec<(f64, f64)> = averaging
         .averaging_s
@@ -65,8 +67,8 @@ pub(in crate::report) fn figure(
         let text = format!("repeats best: {} s", fixed(at, 0));
         panel.entry(&text, VERMILLION, LegendShape::Line, "6 4");
     }
-    let mut sheet = Sheet::new(760.0, 340.0);
-    sheet.place(panel.draw(760.0, 340.0), 0.0, 0.0);
+    let size = [760.0, 340.0];
+    let sheet = Sheet::of(format, size, vec![(panel, [0.0, 0.0, size[0], size[1]])]);
     let name = format!("averaging-{key}");
     let title = format!("How much averages differ, {}", clean(&flight.name));
     Some(Figure {

@@ -11,6 +11,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION};
+use crate::report::format::Format;
 use crate::report::scales::{interval, not_determined, paper_form};
 use crate::report::shapes::Shape;
 use crate::report::sheet::Sheet;
@@ -32,12 +33,13 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     statistics: &FieldStatistics,
+    format: Format,
 ) -> Option<Figure> {
     let space = statistics.space.as_ref();
     let y = correlation_axis(statistics);
     let mut panels = Vec::new();
     if let Some(space) = space {
-        panels.push(distance_panel("(a) All pairs", &space.all, &y, "λ"));
+        panels.push(distance_panel("(a) All pairs", &space.all, &y, ("λ", format)));
     }
     if let Some(time) = &statistics.time {
         panels.push(time_panel(time, &y));
@@ -48,7 +50,7 @@ pub(in crate::report) fn figure(
             ("(d) Pairs along y (left)", "λy", &space.along_y),
         ] {
             if let Some(one) = one {
-                panels.push(distance_panel(name, one, &y, symbol));
+                panels.push(distance_panel(name, one, &y, (symbol, format)));
             }
         }
     }
@@ -56,11 +58,12 @@ pub(in crate::report) fn figure(
         return None;
     }
     let rows = panels.len().div_ceil(2);
-    let mut sheet = Sheet::new(1040.0, rows as f64 * PANEL[1] + 4.0);
-    for (index, panel) in panels.into_iter().enumerate() {
+    let place = |index: usize| {
         let (column, row) = ((index % 2) as f64, (index / 2) as f64);
-        sheet.place(panel.draw(PANEL[0], PANEL[1]), column * 522.0, row * PANEL[1]);
-    }
+        [column * 522.0, row * PANEL[1], PANEL[0], PANEL[1]]
+    };
+    let panels = panels.into_iter().enumerate().map(|(index, panel)| (panel, place(index)));
+    let sheet = Sheet::of(format, [1040.0, rows as f64 * PANEL[1] + 4.0], panels.collect());
     let name = format!("fig6-{key}");
     let title =
         format!("Correlations of the vertical air speed, {} (paper's Fig. 6)", clean(&flight.name));
@@ -99,7 +102,7 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }
 
-fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str) -> Panel {
+fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, (symbol, format): (&str, Format)) -> Panel {
     let farthest = of.classes.iter().map(|class| class.distance_m);
     let mut x = Axis::around("distance between drones (m)", farthest.chain([0.0]), 1.0);
     x.min = 0.0;
@@ -113,6 +116,13 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
         band(&mut panel, &of.classes);
     } else {
         violins(&mut panel, &of.classes, &x);
+    }
+    if format.is_print() {
+        for class in &of.classes {
+            let ends = class.correlations.first().zip(class.correlations.last());
+            let reach = ends.map(|(low, high)| [(class.distance_m, *low), (class.distance_m, *high)]);
+            panel.keep_clear(reach.as_ref().map_or(&[], |reach| reach.as_slice()));
+        }
     }
     let curve = |lambda: f64| -> Vec<(f64, f64)> {
         (0..=CURVE)

@@ -14,6 +14,7 @@ use crate::report::Figure;
 use crate::report::axis::{Axis, decimals_of, nice_step};
 use crate::report::chart::{Panel, frame, thinned};
 use crate::report::colour::{FAINT, GREEN, INK, MUTED, diverging, sequential};
+use crate::report::format::Format;
 use crate::report::law;
 use crate::report::offset_field::OffsetScale;
 use crate::report::raster::image;
@@ -31,6 +32,9 @@ const LAW: [f64; 2] = [412.0, 560.0];
 /// Where (c) starts and (d) stands.
 const OFFSET_TOP: f64 = 2.0 * TRACES[1];
 const LAW_LEFT: f64 = 628.0;
+/// Heights of (a) and (b), (c) and (d) below each other in one column of print, and of what is below (d).
+const NARROW: [f64; 3] = [186.0, 198.0, 290.0];
+const BELOW_LAW: f64 = 52.0;
 /// Picture elements of the offset.
 const ELEMENTS: (usize, usize) = (164, 46);
 
@@ -123,23 +127,65 @@ pub(in crate::report) fn name(key: &str, index: usize, drone: &DroneAnalysis) ->
     format!("fig3-{key}-{}-{}", index + 1, slug(&drone.name))
 }
 
+/// Where the panels lie, [x, y, width, height], and the size of the sheet.
+struct Places {
+    size: [f64; 2],
+    velocity: [f64; 4],
+    pulse: [f64; 4],
+    offset: [f64; 4],
+    law: [f64; 4],
+}
+
+impl Places {
+    fn of(format: Format) -> Self {
+        let wide = format.width();
+        if format.is_narrow() {
+            let [trace, offset, law] = NARROW;
+            let tops = [2.0 * trace, 2.0 * trace + offset];
+            return Self {
+                size: [wide, tops[1] + law + BELOW_LAW],
+                velocity: [0.0, 0.0, wide, trace],
+                pulse: [0.0, trace, wide, trace],
+                offset: [0.0, tops[0], wide, offset],
+                law: [0.0, tops[1], wide, law],
+            };
+        }
+        let (left, law_left) = (format.across(TRACES[0]), format.across(LAW_LEFT));
+        Self {
+            size: [wide, OFFSET_TOP + OFFSET[1]],
+            velocity: [0.0, 0.0, left, TRACES[1]],
+            pulse: [0.0, TRACES[1], left, TRACES[1]],
+            offset: [0.0, OFFSET_TOP, left, OFFSET[1]],
+            law: [law_left, 0.0, format.across(LAW[0]), LAW[1]],
+        }
+    }
+}
+
+/// The frame of a panel in the sheet.
+fn frame_in([x, y, width, height]: [f64; 4], room_right: bool) -> [f64; 4] {
+    let [left, top, w, h] = frame(width, height, room_right);
+    [x + left, y + top, w, h]
+}
+
 /// The four panels of one drone.
 pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     index: usize,
     axes: &Axes,
+    format: Format,
 ) -> Option<Figure> {
     let drone = flight.drones.get(index)?;
     let offset = drone.offset.as_ref();
-    let mut sheet = Sheet::new(1040.0, OFFSET_TOP + OFFSET[1]);
-    sheet.place(velocity_panel(drone, axes).draw(TRACES[0], TRACES[1]), 0.0, 0.0);
-    sheet.place(pulse_panel(drone, axes, offset).draw(TRACES[0], TRACES[1]), 0.0, TRACES[1]);
-    sheet.place(height_panel(axes, offset).draw(OFFSET[0], OFFSET[1]), 0.0, OFFSET_TOP);
-    sheet.place(law_panel(drone, axes).draw(LAW[0], LAW[1]), LAW_LEFT, 0.0);
-    let mut over = Drawing::overlay();
-    flight_path(&mut over, drone, axes, offset);
-    bars(&mut over, axes, offset.is_some());
+    let places = Places::of(format);
+    let mut sheet = Sheet::new(format, places.size);
+    sheet.place(velocity_panel(drone, axes), places.velocity);
+    sheet.place(pulse_panel(drone, axes, offset), places.pulse);
+    sheet.place(height_panel(axes, offset), places.offset);
+    sheet.place(law_panel(drone, axes), places.law);
+    let mut over = Drawing::overlay(format);
+    flight_path(&mut over, drone, axes, offset, places.offset);
+    bars(&mut over, axes, offset.is_some(), &places);
     sheet.lay_over(over);
     let name = name(key, index, drone);
     let title = format!("Calibration of {} (paper's Fig. 3)", clean(&drone.name));
@@ -208,9 +254,14 @@ fn height_panel(axes: &Axes, offset: Option<&OffsetMap>) -> Panel {
 }
 
 /// The picture of the offset, the hovers it was made from, and the flight through it.
-fn flight_path(over: &mut Drawing, drone: &DroneAnalysis, axes: &Axes, offset: Option<&OffsetMap>) {
-    let [x, y, w, h] = frame(OFFSET[0], OFFSET[1], true);
-    let y = y + OFFSET_TOP;
+fn flight_path(
+    over: &mut Drawing,
+    drone: &DroneAnalysis,
+    axes: &Axes,
+    offset: Option<&OffsetMap>,
+    place: [f64; 4],
+) {
+    let [x, y, w, h] = frame_in(place, true);
     let (time, height) = (&axes.time, &axes.height);
     let pixel = |(t, z): (f64, f64)| {
         (
@@ -238,27 +289,27 @@ fn flight_path(over: &mut Drawing, drone: &DroneAnalysis, axes: &Axes, offset: O
 }
 
 /// Colour bars beside the panels.
-fn bars(over: &mut Drawing, axes: &Axes, with_offset: bool) {
+fn bars(over: &mut Drawing, axes: &Axes, with_offset: bool, places: &Places) {
     let symmetric = |limit: f64| {
         let text = |v: f64| signed(v, decimals_of(limit));
         vec![(0.0, text(-limit)), (0.5, text(0.0)), (1.0, text(limit))]
     };
-    let beside = |top: f64, size: [f64; 2]| {
-        let [x, y, w, h] = frame(size[0], size[1], true);
-        [x + w + 8.0, top + y, 9.0, h]
+    let beside = |place: [f64; 4]| {
+        let [x, y, w, h] = frame_in(place, true);
+        [x + w + 8.0, y, 9.0, h]
     };
     let two_sided = |place: f64| diverging(2.0 * place - 1.0);
-    narrow_bar(over, beside(0.0, TRACES), two_sided, &symmetric(axes.velocity_limit));
+    narrow_bar(over, beside(places.velocity), two_sided, &symmetric(axes.velocity_limit));
     let (middle, half) = axes.pulse_scale;
     let ticks = [(0.0, middle - half), (0.5, middle), (1.0, middle + half)];
     let ticks = ticks.map(|(place, value)| (place, fixed(value, 0)));
-    narrow_bar(over, beside(TRACES[1], TRACES), two_sided, &ticks);
+    narrow_bar(over, beside(places.pulse), two_sided, &ticks);
     if let (Some(scale), true) = (&axes.offset, with_offset) {
-        narrow_bar(over, beside(OFFSET_TOP, OFFSET), two_sided, &symmetric(scale.limit_us));
+        narrow_bar(over, beside(places.offset), two_sided, &symmetric(scale.limit_us));
     }
     // The colours of (d), below it.
-    let [x, _, w, _] = frame(LAW[0], LAW[1], false);
-    let (left, top) = (LAW_LEFT + x, LAW[1] + 22.0);
+    let [left, _, w, _] = frame_in(places.law, false);
+    let top = places.law[1] + places.law[3] + over.format().choose(22.0, 10.0);
     for step in 0..60 {
         let place = f64::from(step) / 60.0;
         let slice = [left + place * w, top, w / 60.0 + 0.4, 10.0];

@@ -5,6 +5,7 @@ use super::plan_view::{Projection, colour_bar, cross};
 use crate::analysis::result::FlightAnalysis;
 use crate::report::Figure;
 use crate::report::colour::{FAINT, INK, MUTED, diverging};
+use crate::report::format::Format;
 use crate::report::frames::Frames;
 use crate::report::posterior_grid::{Cells, GridField};
 use crate::report::raster::{Pixel, image};
@@ -21,6 +22,8 @@ const PANEL: f64 = 142.0;
 const PITCH: f64 = 150.0;
 /// Left of the panels: the rows' names.
 const LEFT: f64 = 26.0;
+/// Right of the panels in print.
+const PRINT_RIGHT: f64 = 96.0;
 /// Pixels of the field along a panel's longer side.
 const RASTER: f64 = 72.0;
 /// Every so many pixels of what is not known are grey, along diagonals.
@@ -52,7 +55,12 @@ pub(in crate::report) fn figure(
     frames: &Frames<'_>,
     wind_mps: Option<[f64; 2]>,
     field: Option<&GridField<'_>>,
+    format: Format,
 ) -> Option<Figure> {
+    let (name, title) = titles(flight, key, field.is_some());
+    if format.is_narrow() {
+        return Some(Figure::too_wide(name, title));
+    }
     let (first, last) = (*frames.times.first()?, *frames.times.last()?);
     let span_s = frames.seconds(last) - frames.seconds(first);
     let count = COLUMNS as f64;
@@ -76,17 +84,20 @@ pub(in crate::report) fn figure(
         Some(field) => (field.corners().into_iter().chain(places.iter().copied()).collect(), 0.0),
         None => (places.clone(), 0.3),
     };
-    let projection = |origin| Projection::new(&ground, origin, [PANEL, PANEL], margin);
+    let pitch = format.choose(PITCH, (format.width() - LEFT - PRINT_RIGHT) / count);
+    let side = pitch - (PITCH - PANEL);
+    let projection = |origin| Projection::new(&ground, origin, [side, side], margin);
     let tall = projection([0.0, 0.0])?.size()[1];
     let row_pitch = tall + 30.0;
-    let height = 26.0 + row_pitch * rows.len() as f64;
-    let mut drawing = Drawing::new(1040.0, height.max(220.0));
+    let above = format.choose(26.0, 46.0);
+    let height = above + row_pitch * rows.len() as f64;
+    let mut drawing = Drawing::new(format, [format.width(), height.max(220.0)]);
     for (row, (from_s, step_s, of)) in rows.iter().enumerate() {
-        let top = 26.0 + row as f64 * row_pitch;
+        let top = above + row as f64 * row_pitch;
         let style = TextStyle { size: 13.0, bold: false, colour: MUTED, anchor: Anchor::Middle };
         drawing.text([16.0, top + tall / 2.0], of.words(), style, -90.0);
         for column in 0..COLUMNS {
-            let origin = [LEFT + column as f64 * PITCH, top];
+            let origin = [LEFT + column as f64 * pitch, top];
             let projection = projection(origin)?;
             let time = frames.closest(from_s + column as f64 * step_s)?;
             match field.filter(|_| *of == Of::Posterior) {
@@ -109,26 +120,16 @@ pub(in crate::report) fn figure(
                     rings(&mut drawing, &projection, &lost);
                 }
                 if let Some(wind) = wind_mps {
-                    arrow(&mut drawing, [origin[0], top - 10.0], wind);
+                    let y = format.choose(top - 10.0, 14.0);
+                    arrow(&mut drawing, [origin[0], y], wind);
                 }
             }
         }
     }
-    let bar = [LEFT + count * PITCH + 8.0, 26.0, 16.0, (height - 60.0).clamp(140.0, 320.0)];
+    let right = LEFT + count * pitch + 8.0;
+    let bar = [right, above, format.choose(16.0, 12.0), (height - 60.0).clamp(140.0, 320.0)];
     colour_bar(&mut drawing, bar, frames.limit_mps, "W (m/s, up positive)");
-    scale_bar(&mut drawing, &projection([0.0; 2])?, height);
-    let name = match field {
-        Some(_) => format!("fig5-posterior-{key}"),
-        None => format!("fig5-{key}"),
-    };
-    let title = match field {
-        Some(_) => {
-            format!("Posterior map over time, {} (as the paper's Fig. 5)", clean(&flight.name))
-        }
-        None => {
-            format!("Evolution of the vertical air speed, {} (paper's Fig. 5)", clean(&flight.name))
-        }
-    };
+    scale_bar(&mut drawing, &projection([0.0; 2])?, [right, height - 12.0]);
     let truth = if frames.truth_known {
         " Below each row: the true air at the same drones and times."
     } else {
@@ -160,6 +161,18 @@ pub(in crate::report) fn figure(
             fixed(fine_s, 0),
         ),
     })
+}
+
+/// Name and title of the figure of a flight, of its posterior or of each drone's own estimates.
+fn titles(flight: &FlightAnalysis, key: &str, of_posterior: bool) -> (String, String) {
+    let flight = clean(&flight.name);
+    if of_posterior {
+        let title = format!("Posterior map over time, {flight} (as the paper's Fig. 5)");
+        (format!("fig5-posterior-{key}"), title)
+    } else {
+        let title = format!("Evolution of the vertical air speed, {flight} (paper's Fig. 5)");
+        (format!("fig5-{key}"), title)
+    }
 }
 
 fn panel(drawing: &mut Drawing, projection: &Projection, frames: &Frames<'_>, time: usize, of: Of) {
@@ -267,11 +280,10 @@ fn arrow(drawing: &mut Drawing, [x, y]: [f64; 2], [forward, left]: [f64; 2]) {
 }
 
 /// How long some metres are in the panels, at the right bottom.
-fn scale_bar(drawing: &mut Drawing, projection: &Projection, height: f64) {
+fn scale_bar(drawing: &mut Drawing, projection: &Projection, [x, y]: [f64; 2]) {
     let ([high, low], _) = projection.ranges();
     let length_m = crate::report::axis::nice_step((high - low) / 4.0);
     let pixels = length_m * projection.scale();
-    let (x, y) = (LEFT + COLUMNS as f64 * PITCH + 8.0, height - 12.0);
     drawing.line([x, y, x + pixels, y], INK);
     drawing.line([x, y - 4.0, x, y + 4.0], INK);
     drawing.line([x + pixels, y - 4.0, x + pixels, y + 4.0], INK);

@@ -9,6 +9,7 @@ use crate::report::Figure;
 use crate::report::axis::{Axis, decimals_of};
 use crate::report::colour::{FAINT, INK, MUTED, RULE};
 use crate::report::explorer::pick;
+use crate::report::format::Format;
 use crate::report::offset_field::OffsetScale;
 use crate::report::raster::{Pixel, image};
 use crate::report::svg::{Anchor, Drawing, TextStyle, escape};
@@ -20,6 +21,8 @@ use super::plan_view::{colour_bar, places_of_slots};
 const ROOM: f64 = 840.0;
 /// Left of the grid: the axis of heights.
 const LEFT: f64 = 58.0;
+/// Right of the grid in print.
+const PRINT_RIGHT: f64 = 96.0;
 /// Height above the grid, pixels.
 const TOP: f64 = 28.0;
 /// Widest cell, pixels; its height is 0.72 of its width.
@@ -49,17 +52,20 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     names: &[Option<String>],
+    format: Format,
 ) -> Option<Figure> {
     if flight.drones.len() + flight.missing.len() < 2 {
         return None;
     }
     let scale = OffsetScale::of(flight);
     let places = places(analysis, flight);
-    let cell_w = (ROOM / places.columns as f64).min(WIDEST);
+    let room = format.choose(ROOM, format.width() - LEFT - PRINT_RIGHT);
+    let cell_w = (room / places.columns as f64).min(WIDEST);
     let gap = (0.07 * cell_w).clamp(1.0, 8.0);
     let pitch = [cell_w, ASPECT * cell_w];
     let size = [pitch[0] * places.columns as f64, pitch[1] * places.rows as f64];
-    let mut drawing = Drawing::new(1040.0, TOP + size[1].max(200.0) + 50.0);
+    let mut drawing =
+        Drawing::new(format, [format.width(), TOP + size[1].max(format.choose(200.0, 150.0)) + 50.0]);
     let corner =
         |row: usize, column: usize| [LEFT + column as f64 * pitch[0], TOP + row as f64 * pitch[1]];
     if let Some(scale) = &scale {
@@ -74,7 +80,10 @@ pub(in crate::report) fn figure(
     if let Some(scale) = &scale {
         let [x, y] = corner(places.rows - 1, 0);
         axes(&mut drawing, scale, [x, y, pitch[0] - gap, pitch[1] - gap]);
-        let bar = [LEFT + size[0] + 22.0, TOP + 70.0, 16.0, (size[1] - 90.0).clamp(110.0, 320.0)];
+        let (beside, thick) = format.choose((22.0, 16.0), (10.0, 12.0));
+        let (above, least) = format.choose((70.0, 110.0), (44.0, 96.0));
+        let tall = (size[1] - above - 20.0).clamp(least, 320.0);
+        let bar = [LEFT + size[0] + beside, TOP + above, thick, tall];
         colour_bar(
             &mut drawing,
             bar,
@@ -211,7 +220,7 @@ fn cell(
         |slot| slot.to_string(),
     );
     let small = TextStyle {
-        size: (0.13 * w).clamp(6.0, 11.0),
+        size: drawing.format().text((0.13 * w).clamp(6.0, 11.0)),
         bold: false,
         colour: MUTED,
         anchor: Anchor::Start,

@@ -12,6 +12,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
+use crate::report::format::Format;
 use crate::report::law;
 use crate::report::page::capitalised;
 use crate::report::sheet::Sheet;
@@ -26,7 +27,7 @@ pub(in crate::report) const VELOCITY_LABEL: &str = "vertical velocity (m/s, up p
 const LEGEND_LIMIT: usize = 12;
 
 /// The figure over all flights that have moving windows; `None` without any.
-pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
+pub(in crate::report) fn figure(analysis: &Analysis, format: Format) -> Option<Figure> {
     let flights: Vec<&FlightAnalysis> = analysis
         .flights
         .iter()
@@ -58,13 +59,11 @@ pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
         }
     }
 
-    let mut sheet = Sheet::new(1040.0, 460.0);
     let (side, side_caption) = side_panel(&flights, &colours);
     let wide = if side.is_some() { 620.0 } else { 1040.0 };
-    sheet.place(panel.draw(wide, 460.0), 0.0, 0.0);
-    if let Some(side) = side {
-        sheet.place(side.draw(410.0, 460.0), 630.0, 0.0);
-    }
+    let panels = std::iter::once((panel, [0.0, 0.0, wide, 460.0]))
+        .chain(side.map(|side| (side, [630.0, 0.0, 410.0, 460.0])));
+    let sheet = Sheet::of(format, [1040.0, 460.0], panels.collect());
     let drones: usize = flights.iter().map(|flight| flight.drones.len()).sum();
     let colouring = if flights.len() == 1 {
         format!(

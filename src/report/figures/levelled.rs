@@ -7,6 +7,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, GREEN, MUTED, VERMILLION};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, sentence, usable};
 
@@ -22,6 +23,7 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     map: &UpdraftMap,
+    format: Format,
 ) -> Option<Figure> {
     let levelled = map.levelled.as_ref()?;
     let panels: Vec<Panel> = map
@@ -34,10 +36,10 @@ pub(in crate::report) fn figure(
     if panels.is_empty() {
         return None;
     }
-    let mut sheet = Sheet::new(WIDTH, HEIGHT * panels.len() as f64);
-    for (index, panel) in panels.into_iter().enumerate() {
-        sheet.place(panel.draw(WIDTH, HEIGHT), 0.0, HEIGHT * index as f64);
-    }
+    let size = [WIDTH, HEIGHT * panels.len() as f64];
+    let panels = panels.into_iter().enumerate();
+    let panels = panels.map(|(row, panel)| (panel, [0.0, HEIGHT * row as f64, WIDTH, HEIGHT]));
+    let sheet = Sheet::of(format, size, panels.collect());
     let mut caption = format!(
         "Running 10 s means by {}. Blue: the estimate with its 95 % interval for the air at the drone",
         clean(&levelled.words())

@@ -1,7 +1,7 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
 use super::air::{mean, mean_truth};
-use super::map_marks::{MARKS_HEIGHT, ground, ground_words, marks};
+use super::map_marks::{MARKS_HEIGHT, NEXT_ROW, ground, ground_words, marks};
 use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
 use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, UpdraftMap};
 use crate::base::estimate::Estimate;
@@ -9,12 +9,20 @@ use crate::report::Figure;
 use crate::report::basemap::Basemap;
 use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
 use crate::report::explorer::pick;
+use crate::report::format::Format;
+use crate::report::print_panel::width_of;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, count, estimate, fixed, signed, usable};
 
 /// Narrowest cell that holds a readable value, pixels, and one that holds its error and the slot as well.
 const VALUE_PX: f64 = 38.0;
 const ERROR_PX: f64 = 56.0;
+/// The same of the latter in print.
+const PRINT_ERROR_PX: f64 = 45.0;
+/// Room left of the maps and right of them in print, and between two, pixels.
+const PRINT_LEFT: f64 = 56.0;
+const PRINT_RIGHT: f64 = 92.0;
+const BETWEEN: f64 = 30.0;
 
 /// What the cells are wide enough for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +31,75 @@ struct Room {
     decimals: Option<usize>,
     /// Whether error and slot stand beside it.
     all: bool,
+}
+
+impl Room {
+    /// What cells of so many pixels have room for, with values of so many decimals.
+    fn of(format: Format, cell_px: f64, decimals: usize) -> Self {
+        if !format.is_print() {
+            let decimals = (cell_px >= VALUE_PX).then_some(decimals);
+            return Self { decimals, all: cell_px >= ERROR_PX };
+        }
+        // A sign, a digit and the point beside them, in the smallest text that is read.
+        let fits = |decimals: usize| width_of("+0.", format.text(0.0), true)
+            + width_of("0", format.text(0.0), true) * decimals as f64 <= cell_px;
+        let decimals = [decimals, decimals.min(2)].into_iter().find(|decimals| fits(*decimals));
+        Self { decimals, all: decimals.is_some() && cell_px >= PRINT_ERROR_PX }
+    }
+}
+
+/// Where the maps lie on their sheet.
+struct MapSheet {
+    /// Upper edge of the first map, pixels.
+    top: f64,
+    /// Room for each, width and height, pixels.
+    room: [f64; 2],
+    /// Room right of the last, pixels.
+    beside: f64,
+    /// Whether the truth is beside the estimate, or below it; absent: it is not known.
+    truth: Option<Truth>,
+    /// Height of what is below the axes, pixels.
+    marks_height: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Truth {
+    Beside,
+    Below,
+}
+
+impl MapSheet {
+    fn of(format: Format, truth_known: bool) -> Self {
+        let wide = format.width();
+        let truth = truth_known.then_some(if format.is_narrow() { Truth::Below } else { Truth::Beside });
+        let top = if truth_known { 40.0 } else { 16.0 };
+        // Two maps beside each other, or one that fills the sheet.
+        let across = wide - PRINT_LEFT - PRINT_RIGHT;
+        let room = match truth {
+            Some(Truth::Beside) => {
+                let half = (across - BETWEEN) / 2.0;
+                format.choose([424.0, 424.0], [half, half])
+            }
+            _ => format.choose([800.0, 620.0], [across, 540.0]),
+        };
+        let second = if format.is_narrow() { NEXT_ROW } else { 0.0 };
+        Self { top, room, beside: PRINT_RIGHT, truth, marks_height: MARKS_HEIGHT + second }
+    }
+
+    /// Left edge of a first map of a width: in print the maps are in the middle.
+    fn left(&self, format: Format, width: f64) -> f64 {
+        let maps = if self.truth == Some(Truth::Beside) { 2.0 * width + BETWEEN } else { width };
+        let spare = format.width() - PRINT_LEFT - maps - self.beside;
+        format.choose(70.0, PRINT_LEFT + (spare / 2.0).max(0.0))
+    }
+
+    /// Upper left corner of the map of the truth.
+    fn aside(&self, left: f64, [width, height]: [f64; 2]) -> Option<[f64; 2]> {
+        self.truth.map(|truth| match truth {
+            Truth::Beside => [left + width + BETWEEN, self.top],
+            Truth::Below => [left, self.top + height.max(180.0) + 84.0],
+        })
+    }
 }
 
 /// Whose means the squares show.
@@ -57,6 +134,7 @@ pub(in crate::report) fn mean_map(
     map: &UpdraftMap,
     means: Means,
     basemap: Option<&Basemap>,
+    format: Format,
 ) -> Option<Figure> {
     let mut positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
     if positions.is_empty() {
@@ -80,25 +158,33 @@ pub(in crate::report) fn mean_map(
     let truths: Vec<Option<f64>> =
         map.drones.iter().map(|drone| mean_truth(drone).filter(|w| usable(*w))).collect();
     let truth_known = truths.iter().any(Option::is_some);
-    // Two maps beside each other, or one that fills the sheet.
-    let (top, room) = if truth_known { (40.0, [424.0, 424.0]) } else { (16.0, [800.0, 620.0]) };
+    let sheet = MapSheet::of(format, truth_known);
+    let (top, room) = (sheet.top, sheet.room);
     // Over a picture some ground is left around the drones.
     let margin = if basemap.is_some() { 1.5 } else { 0.5 };
-    let projection = Projection::new(&positions, [70.0, top], room, margin)?;
-    let [width, height] = projection.size();
+    let [width, height] = Projection::new(&positions, [0.0; 2], room, margin)?.size();
+    let left = sheet.left(format, width);
+    let projection = Projection::new(&positions, [left, top], room, margin)?;
     let limit = scale_of(map, means);
-    let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
-    let mut drawing =
-        Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0 + MARKS_HEIGHT);
+    let aside = sheet.aside(left, [width, height]);
+    let right = aside.map_or(left, |[x, _]| x) + width;
+    // Below the lower of the maps.
+    let bottom = match aside {
+        Some([_, y]) if y > top => y + height,
+        _ => top + height.max(format.choose(220.0, 180.0)),
+    };
+    let size = [
+        format.choose((right + 130.0).max(380.0), format.width()),
+        bottom + 58.0 + sheet.marks_height,
+    ];
+    let mut drawing = Drawing::new(format, size);
     if let Some(basemap) = basemap {
         ground(&mut drawing, &projection, flight, basemap);
     }
     let cell_px = positions.first().map_or(0.0, |place| projection.cell(*place)[2]);
     // As many decimals as the largest error asks for, the same in all cells.
     let largest = map.drones.iter().map(|drone| means.of(drone).se).filter(|se| usable(*se));
-    let decimals = error_decimals(largest.fold(0.0, f64::max));
-    let decimals = (cell_px >= VALUE_PX).then_some(decimals);
-    let text = Room { decimals, all: cell_px >= ERROR_PX };
+    let text = Room::of(format, cell_px, error_decimals(largest.fold(0.0, f64::max)));
     for (slot, home) in &empty {
         empty_cell(&mut drawing, *slot, projection.cell(*home), text);
     }
@@ -112,10 +198,13 @@ pub(in crate::report) fn mean_map(
         filled_cell(&mut drawing, drone, *mean, projection.cell(drone.position_m), limit, text);
     }
     axes(&mut drawing, &projection);
-    let below = top + height.max(220.0) + 58.0 + MARKS_HEIGHT / 2.0;
+    let below = bottom + 58.0 + MARKS_HEIGHT / 2.0;
     marks(&mut drawing, &projection, flight, [projection.origin()[0], below]);
-    if truth_known {
-        let aside = Projection::new(&positions, [100.0 + width, top], room, margin)?;
+    if let Some(place) = aside {
+        let aside = Projection::new(&positions, place, room, margin)?;
+        if place[1] > top {
+            axes(&mut drawing, &aside);
+        }
         for (slot, home) in &empty {
             empty_cell(&mut drawing, *slot, aside.cell(*home), text);
         }
@@ -130,11 +219,13 @@ pub(in crate::report) fn mean_map(
         };
         for (projection, words) in [(&projection, estimated), (&aside, "true W")] {
             let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
-            drawing.text([projection.origin()[0], top - 12.0], words, style, 0.0);
+            let [x, y] = projection.origin();
+            drawing.text([x, y - 12.0], words, style, 0.0);
         }
     }
     let bar_height = height.clamp(160.0, 420.0);
-    let bar = [right + 34.0, top, 18.0, bar_height];
+    let (beside, thick) = format.choose((34.0, 18.0), (12.0, 12.0));
+    let bar = [right + beside, top, thick, bar_height];
     colour_bar(
         &mut drawing,
         bar,

@@ -14,8 +14,10 @@ use crate::report::text::{clean, fixed, usable};
 
 /// Height that the marks take below the axes, pixels.
 pub(super) const MARKS_HEIGHT: f64 = 46.0;
+/// The same of a second row of them.
+pub(super) const NEXT_ROW: f64 = 28.0;
 /// Share of colour in squares over a picture.
-const CELLS: f64 = 0.7;
+pub(super) const CELLS: f64 = 0.7;
 
 /// The picture below the squares, which are drawn after it; none where the show's place is not known.
 pub(super) fn ground(
@@ -41,13 +43,19 @@ pub(super) fn ground(
     for [forward, left] in corners {
         let _ = write!(told, "{}[{forward:.2},{left:.2}]", if told.is_empty() { "" } else { "," });
     }
+    // In print the squares say it themselves.
+    let style = drawing.format().choose(
+        format!(
+            "<style>svg.ground ~ g[data-pick] > rect {{ fill-opacity: var(--cells, {CELLS}) }}</style>"
+        ),
+        String::new(),
+    );
     // An inner drawing shows nothing beyond its edges.
     drawing.raw(&format!(
         "<svg class=\"ground\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" \
          viewBox=\"{x:.1} {y:.1} {w:.1} {h:.1}\"><image class=\"basemap\" width=\"1\" height=\"1\" \
          preserveAspectRatio=\"none\" transform=\"matrix({:.4} {:.4} {:.4} {:.4} {:.2} {:.2})\" \
-         data-corners=\"[{told}]\" href=\"{}\"/></svg><style>svg.ground ~ g[data-pick] > rect {{ fill-opacity: \
-         var(--cells, {CELLS}) }}</style>",
+         data-corners=\"[{told}]\" href=\"{}\"/></svg>{style}",
         ne[0] - nw[0],
         ne[1] - nw[1],
         sw[0] - nw[0],
@@ -82,6 +90,7 @@ pub(super) fn marks(
         drawing.line([at, y - 4.0, at, y + 4.0], INK);
     }
     drawing.text([end + 8.0, y + 4.0], &format!("{} m", fixed(length_m, 0)), style, 0.0);
+    let is_narrow = drawing.format().is_narrow();
     let mut next = end + 76.0;
     if let Some(orientation) = flight.orientation_deg.filter(|deg| usable(*deg)) {
         // Forward is up and left is left: north turns against the show.
@@ -90,6 +99,8 @@ pub(super) fn marks(
         drawing.text([next + 18.0, y + 4.0], "north", style, 0.0);
         next += 84.0;
     }
+    // In one column of print the wind is below.
+    let (next, y) = if is_narrow { (x + 12.0, y + NEXT_ROW) } else { (next, y) };
     if let Some([forward, left]) = wind(flight) {
         let speed = forward.hypot(left);
         arrow(drawing, [next, y], [-left / speed, -forward / speed]);

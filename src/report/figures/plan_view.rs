@@ -6,6 +6,7 @@ use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis};
 use crate::numeric::extent;
 use crate::report::axis::{decimals_of, nice_step, scale_end};
 use crate::report::colour::{FAINT, INK, MUTED, diverging};
+use crate::report::print_panel::width_of;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{fixed, signed, usable};
 
@@ -164,7 +165,8 @@ pub(super) fn axes(drawing: &mut Drawing, projection: &Projection) {
     let label = style(13.0, INK, Anchor::Middle);
     drawing.text([left + width / 2.0, bottom + 42.0], "← left, show y (m)", label, 0.0);
     let middle = projection.origin[1] + height / 2.0;
-    drawing.text([24.0, middle], "forward, show x (m) →", label, -90.0);
+    let edge = drawing.format().choose(24.0, left - 40.0);
+    drawing.text([edge, middle], "forward, show x (m) →", label, -90.0);
 }
 
 fn ticks((low, high): (f64, f64)) -> Vec<f64> {
@@ -199,7 +201,9 @@ pub(super) fn colour_bar(drawing: &mut Drawing, [x, y, w, h]: [f64; 4], limit: f
         drawing.text([x + w + 8.0, at + 4.0], &signed(part * limit, decimals), style, 0.0);
     }
     let style = TextStyle { size: 13.0, bold: false, colour: INK, anchor: Anchor::Middle };
-    drawing.text([x + w + 64.0, y + h / 2.0], label, style, -90.0);
+    let numbers = width_of(&signed(limit / 2.0, decimals), 12.0, false);
+    let beside = drawing.format().choose(64.0, 8.0 + numbers + 15.0);
+    drawing.text([x + w + beside, y + h / 2.0], label, style, -90.0);
 }
 
 /// A narrow colour bar beside a panel: `colour` of 0 (bottom) to 1 (top), ticks at such places.

@@ -8,6 +8,7 @@ use crate::study::sensitivity::{FactorResult, OutcomeResult, SensitivityResult, 
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, FAINT, INK, MUTED, RULE, VERMILLION};
+use crate::report::format::Format;
 use crate::report::sensitivity_terminal::{capital, in_order};
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
@@ -33,11 +34,11 @@ const STRETCHES: usize = 8;
 const FEWEST: usize = 5;
 
 /// All figures that the study has data for.
-pub(in crate::report) fn figures(study: &SensitivityResult, points: &Points) -> Vec<Figure> {
-    let bars = influences(study);
+pub(in crate::report) fn figures(study: &SensitivityResult, points: &Points, format: Format) -> Vec<Figure> {
+    let bars = influences(study, format);
     let scatter = study.outcomes.iter().enumerate().take(MOST_OUTCOMES);
     bars.into_iter()
-        .chain(scatter.filter_map(|(index, outcome)| scattered(study, points, index, outcome)))
+        .chain(scatter.filter_map(|(index, outcome)| scattered(study, points, (index, outcome), format)))
         .collect()
 }
 
@@ -46,7 +47,7 @@ fn style(size: f64, colour: &str, anchor: Anchor, bold: bool) -> TextStyle<'_> {
 }
 
 /// Bars of indices or coefficients, a panel for each outcome.
-fn influences(study: &SensitivityResult) -> Option<Figure> {
+fn influences(study: &SensitivityResult, format: Format) -> Option<Figure> {
     let is_sobol = study.design == "sobol";
     let shown: Vec<&OutcomeResult> = study
         .outcomes
@@ -58,11 +59,13 @@ fn influences(study: &SensitivityResult) -> Option<Figure> {
     if shown.is_empty() || rows == 0 {
         return None;
     }
-    let size = [WIDTH / COLUMNS as f64, 74.0 + ROW * rows as f64 + 44.0];
-    let sheet_rows = shown.len().div_ceil(COLUMNS);
-    let mut drawing = Drawing::new(WIDTH, sheet_rows as f64 * size[1] + 24.0);
+    let columns = if format.is_narrow() { 1 } else { COLUMNS };
+    let size = [format.width() / columns as f64, 74.0 + ROW * rows as f64 + 44.0];
+    let sheet_rows = shown.len().div_ceil(columns);
+    let mut drawing =
+        Drawing::new(format, [format.width(), sheet_rows as f64 * size[1] + 24.0]);
     for (index, outcome) in shown.iter().enumerate() {
-        let corner = [(index % COLUMNS) as f64 * size[0], (index / COLUMNS) as f64 * size[1]];
+        let corner = [(index % columns) as f64 * size[0], (index / columns) as f64 * size[1]];
         panel(&mut drawing, outcome, corner, size, is_sobol);
     }
     legend(&mut drawing, sheet_rows as f64 * size[1] + 4.0, is_sobol);
@@ -126,7 +129,7 @@ fn panel(
         _ => String::new(),
     };
     drawing.text([left + 6.0, top + 38.0], &note, style(12.0, MUTED, Anchor::Start, false), 0.0);
-    let step = if high - low > 1.3 { 0.5 } else { 0.25 };
+    let step = if high - low > 1.3 || drawing.format().is_print() { 0.5 } else { 0.25 };
     let first = (low / step).ceil() as i64;
     for tick in (first..).map(|k| k as f64 * step).take_while(|tick| *tick <= high + 1e-9) {
         let x = place(tick);
@@ -171,8 +174,9 @@ fn legend(drawing: &mut Drawing, y: f64, is_sobol: bool) {
     } else {
         vec![(VERMILLION, true, "grows with the factor"), (BLUE, true, "falls with the factor")]
     };
+    let start = if drawing.format().is_narrow() { 8.0 } else { NAMES };
     for (index, (colour, is_filled, words)) in entries.into_iter().enumerate() {
-        let x = NAMES + 190.0 * index as f64;
+        let x = start + 190.0 * index as f64;
         let (fill, more) = if is_filled {
             (colour, "fill-opacity=\"0.75\"".to_owned())
         } else {
@@ -187,8 +191,8 @@ fn legend(drawing: &mut Drawing, y: f64, is_sobol: bool) {
 fn scattered(
     study: &SensitivityResult,
     points: &Points,
-    index: usize,
-    outcome: &OutcomeResult,
+    (index, outcome): (usize, &OutcomeResult),
+    format: Format,
 ) -> Option<Figure> {
     let values = points.outcomes.get(index)?;
     let known: Vec<f64> = values.iter().copied().flatten().collect();
@@ -200,7 +204,7 @@ fn scattered(
     let spread = outcome.sd.unwrap_or(0.0).max(1e-3);
     let y = Axis::around(&shortened(&label, 34), known.iter().copied(), spread);
     let rows = points.factors.len().div_ceil(COLUMNS);
-    let mut sheet = Sheet::new(WIDTH, rows as f64 * PANEL[1]);
+    let mut panels = Vec::new();
     for (place, (factor, levels)) in study.factors.iter().zip(&points.factors).enumerate() {
         let both: Vec<(f64, f64)> = levels
             .iter()
@@ -209,12 +213,10 @@ fn scattered(
             .collect();
         let panel = of_factor(factor, &both, &y);
         let (row, column) = (place / COLUMNS, place % COLUMNS);
-        sheet.place(
-            panel.draw(PANEL[0], PANEL[1]),
-            column as f64 * PANEL[0],
-            row as f64 * PANEL[1],
-        );
+        let corner = [column as f64 * PANEL[0], row as f64 * PANEL[1]];
+        panels.push((panel, [corner[0], corner[1], PANEL[0], PANEL[1]]));
     }
+    let sheet = Sheet::of(format, [WIDTH, rows as f64 * PANEL[1]], panels);
     let name = format!("scatter-{}", slug(&outcome.name));
     let title = format!("{} against each factor", capital(&outcome.title));
     let drawn = known.len();

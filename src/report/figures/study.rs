@@ -15,6 +15,7 @@ use crate::report::Figure;
 use crate::report::axis::{Axis, nice_step};
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{count, fixed, signed, usable};
 
@@ -36,8 +37,8 @@ struct Coloured<'a> {
 }
 
 /// All figures that the study has data for.
-pub(in crate::report) fn figures(study: &StudyResult) -> Vec<Figure> {
-    [still(study), winds(study), errors(study)].into_iter().flatten().collect()
+pub(in crate::report) fn figures(study: &StudyResult, format: Format) -> Vec<Figure> {
+    [still(study, format), winds(study, format), errors(study, format)].into_iter().flatten().collect()
 }
 
 /// A and u0 that all fits hold.
@@ -108,7 +109,7 @@ fn curve(a: f64, u0: f64, w: f64, v: &Axis, u: &Axis) -> Vec<(f64, f64)> {
 }
 
 /// Fig. 2 with its inset.
-fn still(study: &StudyResult) -> Option<Figure> {
+fn still(study: &StudyResult, format: Format) -> Option<Figure> {
     let coloured = of_condition(study, Condition::STILL);
     if coloured.flights.is_empty() {
         return None;
@@ -132,10 +133,23 @@ fn still(study: &StudyResult) -> Option<Figure> {
     if unused > 0 {
         panel.entry("not used", VERMILLION, LegendShape::Marker(MarkerShape::Cross), "");
     }
-    let mut sheet = Sheet::new(1040.0, 720.0);
-    sheet.place(panel.draw(1040.0, 720.0), 0.0, 0.0);
-    sheet.cover([70.0, 33.0, 350.0, 242.0]);
-    sheet.place(inset(&coloured).draw(350.0, 250.0), 68.0, 24.0);
+    let inset = inset(&coloured);
+    let sheet = if format.is_narrow() {
+        // No room inside: it stands below.
+        let wide = format.width();
+        let mut sheet = Sheet::new(format, [wide, 640.0]);
+        sheet.place(panel, [0.0, 0.0, wide, 390.0]);
+        sheet.place(inset, [0.0, 390.0, wide, 250.0]);
+        sheet
+    } else {
+        let tall = format.choose(720.0, 560.0);
+        let [wide, high] = [format.across(350.0), 250.0 * tall / 720.0];
+        let mut sheet = Sheet::new(format, [format.width(), tall]);
+        sheet.place(panel, [0.0, 0.0, format.width(), tall]);
+        sheet.cover([70.0, 33.0, wide, high - 8.0]);
+        sheet.place(inset, [68.0, 24.0, wide, high]);
+        sheet
+    };
     let name = FIG2.to_owned();
     let title = "Pulse width against vertical velocity in still air, by updraft (paper's Fig. 2)"
         .to_owned();
@@ -190,7 +204,7 @@ fn inset(coloured: &Coloured<'_>) -> Panel {
 }
 
 /// One panel for each wind.
-fn winds(study: &StudyResult) -> Option<Figure> {
+fn winds(study: &StudyResult, format: Format) -> Option<Figure> {
     let windy: Vec<&ConditionResult> = study
         .paper_way
         .conditions
@@ -207,7 +221,7 @@ fn winds(study: &StudyResult) -> Option<Figure> {
     // Every other tick fits these panels.
     v.step *= 2.0;
     let rows = shown.div_ceil(COLUMNS);
-    let mut sheet = Sheet::new(1040.0, rows as f64 * PANEL[1]);
+    let mut panels = Vec::new();
     for (index, found) in windy.iter().take(shown).enumerate() {
         let coloured = of_condition(study, found.condition);
         let rho = found.regression.map_or(String::new(), |r| format!(", ρ = {}", rho(r.rho)));
@@ -215,12 +229,10 @@ fn winds(study: &StudyResult) -> Option<Figure> {
             Panel::new(&format!("{}{rho}", found.condition.label()), v.clone(), u.clone());
         coloured.draw(&mut panel, (&v, &u), 2.2);
         let (row, column) = (index / COLUMNS, index % COLUMNS);
-        sheet.place(
-            panel.draw(PANEL[0], PANEL[1]),
-            column as f64 * PANEL[0],
-            row as f64 * PANEL[1],
-        );
+        let corner = [column as f64 * PANEL[0], row as f64 * PANEL[1]];
+        panels.push((panel, [corner[0], corner[1], PANEL[0], PANEL[1]]));
     }
+    let sheet = Sheet::of(format, [1040.0, rows as f64 * PANEL[1]], panels);
     let name = "study-winds".to_owned();
     let title = "The same in every wind".to_owned();
     let left_out = windy.len() - shown;
@@ -241,7 +253,7 @@ fn winds(study: &StudyResult) -> Option<Figure> {
 }
 
 /// W* - W against W, a line for each condition.
-fn errors(study: &StudyResult) -> Option<Figure> {
+fn errors(study: &StudyResult, format: Format) -> Option<Figure> {
     let error = |flight: &StudyFlight, w: Option<Estimate>| {
         w.map(|w| (flight.updraft_mps, w.value - flight.updraft_mps))
             .filter(|(_, error)| usable(*error))
@@ -259,7 +271,7 @@ fn errors(study: &StudyResult) -> Option<Figure> {
         let place = winds.iter().position(|other| *other == wind).unwrap_or(0);
         [INK, BLUE, GREEN, MUTED].get(place).copied().unwrap_or(FAINT)
     };
-    let mut sheet = Sheet::new(1040.0, 400.0);
+    let mut panels = Vec::new();
     for (index, title) in ["(a) The paper's way", "(b) This program's way"].into_iter().enumerate()
     {
         let mut panel = Panel::new(title, x.clone(), y.clone());
@@ -278,8 +290,9 @@ fn errors(study: &StudyResult) -> Option<Figure> {
             let label = if *wind == 0.0 { "still air".to_owned() } else { format!("{wind} m/s") };
             panel.entry(&label, colour(*wind), LegendShape::Line, "");
         }
-        sheet.place(panel.draw(515.0, 400.0), 525.0 * index as f64, 0.0);
+        panels.push((panel, [525.0 * index as f64, 0.0, 515.0, 400.0]));
     }
+    let sheet = Sheet::of(format, [1040.0, 400.0], panels);
     let name = "study-errors".to_owned();
     let title = "Error of the fitted updraft".to_owned();
     Some(Figure {

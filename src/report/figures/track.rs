@@ -7,6 +7,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, VERMILLION};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, count, usable};
 
@@ -64,6 +65,7 @@ pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     map: &UpdraftMap,
+    format: Format,
 ) -> Option<Figure> {
     let tracks: Vec<(&DroneUpdraft, Vec<WayPoint>)> = map
         .drones
@@ -92,7 +94,7 @@ pub(in crate::report) fn figure(
     let mut x = Axis::around("way flown (m)", ways.chain([0.0]), 10.0);
     x.min = 0.0;
     let known = all().any(|point| point.truth_mps.is_some());
-    let mut sheet = Sheet::new(WIDTH, HEIGHT * chosen.len() as f64);
+    let mut panels = Vec::new();
     for (row, (drone, points)) in chosen.iter().enumerate() {
         let mut panel = Panel::new(&clean(&drone.name), x.clone(), y.clone());
         panel.legend_at(LegendPosition::InsideTopRight);
@@ -121,8 +123,9 @@ pub(in crate::report) fn figure(
                 panel.entry("true air", VERMILLION, LegendShape::Line, "6 4");
             }
         }
-        sheet.place(panel.draw(WIDTH, HEIGHT), 0.0, HEIGHT * row as f64);
+        panels.push((panel, [0.0, HEIGHT * row as f64, WIDTH, HEIGHT]));
     }
+    let sheet = Sheet::of(format, [WIDTH, HEIGHT * chosen.len() as f64], panels);
     let name = format!("track-{key}");
     let title = format!("Vertical air speed along the track, {}", clean(&flight.name));
     let of = if chosen.len() < tracks.len() {

@@ -20,6 +20,7 @@ use super::error::WorkflowError;
 use super::find::{Found, Work, find, lean_tables};
 use super::hashes::Hashes;
 use super::host::Host;
+use super::paper::{PaperFigures, Shown};
 use super::pages;
 use super::provenance::provenance;
 use crate::analysis::battery::Sag;
@@ -267,6 +268,17 @@ impl Analysed {
         page_made.and(fields_made)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
+    }
+
+    /// Writes the figures of the report as papers print them.
+    ///
+    /// # Errors
+    ///
+    /// If they cannot be made or written.
+    pub fn print(&self, host: &dyn Host, paper: &PaperFigures) -> Result<(), WorkflowError> {
+        let study = read_study(host, &self.root);
+        let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
+        paper.write(host, Shown::Analysis(&self.analysis, beside))
     }
 
     /// Whether the analysis has neither a law nor a value of the map.

@@ -43,6 +43,7 @@ mod manners;
 mod manual;
 mod masts;
 mod orders;
+mod paper;
 mod physics;
 mod plan;
 mod plan_messages;

@@ -7,6 +7,7 @@ mod explorer;
 mod fields;
 mod gap;
 mod page;
+mod paper;
 pub(crate) mod synthetic;
 mod terminal;
 mod verdicts;

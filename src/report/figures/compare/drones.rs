@@ -9,6 +9,7 @@ use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel, frame};
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION};
 use crate::report::compare_words::pair;
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{unit, usable};
@@ -19,7 +20,7 @@ const PANEL: [f64; 2] = [1040.0, 300.0];
 const MOST_LABELS: usize = 64;
 
 /// The drones; `None` where they are not told from the fleet.
-pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure> {
+pub(in crate::report) fn figure(law: &LawComparison, key: &str, format: Format) -> Option<Figure> {
     let panels: Vec<(Quantity, &str, String)> = [
         (Quantity::Hover, "(a) Effort in hover", unit(&law.effort_unit)),
         (Quantity::Response, "(b) Response to vertical speed", response_unit(law)),
@@ -30,11 +31,14 @@ pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure
     if panels.is_empty() {
         return None;
     }
-    let mut sheet = Sheet::new(PANEL[0], panels.len() as f64 * PANEL[1]);
-    for (row, (quantity, title, unit)) in panels.iter().enumerate() {
-        let top = row as f64 * PANEL[1];
-        let (panel, labels) = panel(law, *quantity, title, unit, top);
-        sheet.place(panel.draw(PANEL[0], PANEL[1]), 0.0, top);
+    let rows = 0..panels.len();
+    let on_page: Vec<[f64; 4]> =
+        rows.map(|row| [0.0, row as f64 * PANEL[1], PANEL[0], PANEL[1]]).collect();
+    let (size, places) = format.arrange([PANEL[0], on_page.len() as f64 * PANEL[1]], &on_page);
+    let mut sheet = Sheet::new(format, size);
+    for ((quantity, title, unit), place) in panels.iter().zip(places) {
+        let (panel, labels) = panel(law, *quantity, title, unit, (place, format));
+        sheet.place(panel, place);
         sheet.lay_over(labels);
     }
     let name = format!("compare-drones-{key}");
@@ -68,7 +72,7 @@ fn panel(
     quantity: Quantity,
     title: &str,
     unit: &str,
-    top: f64,
+    ([start, top, wide, tall], format): ([f64; 4], Format),
 ) -> (Panel, Drawing) {
     let place = |index: usize, one: &DroneChange| one.slot.map_or(index as f64 + 1.0, f64::from);
     let known: Vec<(&DroneChange, Mark, bool)> = (law.drones.iter().enumerate())
@@ -92,10 +96,12 @@ fn panel(
     };
     panel.marks(&of(false), BLUE, 3.6, MarkerShape::Circle);
     panel.marks(&of(true), VERMILLION, 5.6, MarkerShape::Diamond);
-    let mut labels = Drawing::overlay();
-    let [left, above, width, height] = frame(PANEL[0], PANEL[1], false);
+    let mut labels = Drawing::overlay(format);
+    let [left, above, width, height] = frame(wide, tall, false);
+    // Each label needs its room.
+    let most_labels = format.choose(MOST_LABELS, (width / 20.0) as usize);
     for (one, mark, is_changed) in &known {
-        if !is_changed && known.len() > MOST_LABELS {
+        if !is_changed && known.len() > most_labels {
             continue;
         }
         let style = TextStyle {
@@ -105,7 +111,7 @@ fn panel(
             anchor: Anchor::Start,
         };
         let at = [
-            left + width * (mark.x - x.min) / (x.max - x.min) + 7.0,
+            start + left + width * (mark.x - x.min) / (x.max - x.min) + 7.0,
             top + above + height * (y.max - mark.y) / (y.max - y.min) + 4.0,
         ];
         let label = one.slot.map_or_else(|| one.name.clone(), |slot| slot.to_string());

@@ -10,6 +10,7 @@ use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{GREEN, MUTED};
 use crate::report::compare_words::pair;
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::{shortened, unit};
 
@@ -21,7 +22,7 @@ const LABEL: usize = 30;
 type Of = fn(&CurvePoint) -> Estimate;
 
 /// The laws; `None` where the ladders have no speeds in common.
-pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure> {
+pub(in crate::report) fn figure(law: &LawComparison, key: &str, format: Format) -> Option<Figure> {
     if law.curve.is_empty() {
         return None;
     }
@@ -66,9 +67,9 @@ pub(in crate::report) fn figure(law: &LawComparison, key: &str) -> Option<Figure
     below.band(&band, GREEN);
     let line: Vec<_> = change.iter().map(|(speed, value, _)| (*speed, *value)).collect();
     below.line(&line, GREEN, 2.0, "");
-    let mut sheet = Sheet::new(1040.0, PANEL[1]);
-    sheet.place(panel.draw(PANEL[0], PANEL[1]), 0.0, 0.0);
-    sheet.place(below.draw(PANEL[0], PANEL[1]), 522.0, 0.0);
+    let panels =
+        [(panel, [0.0, 0.0, PANEL[0], PANEL[1]]), (below, [522.0, 0.0, PANEL[0], PANEL[1]])];
+    let sheet = Sheet::of(format, [1040.0, PANEL[1]], panels.into());
     let name = format!("compare-laws-{key}");
     let title = format!("Laws of the fleet, {}", pair(&law.pair));
     Some(Figure {

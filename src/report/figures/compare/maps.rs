@@ -6,6 +6,7 @@ use crate::compare::result::{MapComparison, PlaceChange};
 use crate::report::Figure;
 use crate::report::colour::{INK, diverging, ink_on_diverging};
 use crate::report::compare_words::pair;
+use crate::report::format::Format;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, estimate, fixed, shortened, signed, usable};
 
@@ -19,42 +20,56 @@ const TEXT_LIMIT: usize = 150;
 /// Columns of a heading.
 const LABEL: usize = 34;
 
+/// Narrowest cell with numbers in print, pixels.
+const LEAST_CELL: f64 = 38.0;
+
 type Of = fn(&PlaceChange) -> Estimate;
 
 /// The maps; `None` where their places differ.
-pub(in crate::report) fn figure(map: &MapComparison, key: &str) -> Option<Figure> {
+pub(in crate::report) fn figure(map: &MapComparison, key: &str, format: Format) -> Option<Figure> {
+    let name = format!("compare-maps-{key}");
+    let title = format!("Means of the air by place, {}", pair(&map.pair));
     let places = &map.places.as_ref()?.places;
+    if format.is_narrow() {
+        return Some(Figure::too_wide(name, title));
+    }
     let at: Vec<[f64; 2]> = places.iter().map(|place| place.position_m).collect();
-    let first = Projection::new(&at, [70.0, TOP], [SIDE, SIDE], 0.5)?;
+    let side = format.choose(SIDE, (format.width() - 302.0) / 3.0);
+    let (left, between) = format.choose((70.0, BETWEEN), (58.0, 14.0));
+    let first = Projection::new(&at, [left, TOP], [side, side], 0.5)?;
     let [width, height] = first.size();
     // The heading of a map must fit, too.
-    let shift = width.max(230.0) + BETWEEN;
-    let second = Projection::new(&at, [70.0 + shift, TOP], [SIDE, SIDE], 0.5)?;
-    let third = Projection::new(&at, [70.0 + 2.0 * shift + 110.0, TOP], [SIDE, SIDE], 0.5)?;
+    let shift = width.max(format.choose(230.0, side)) + between;
+    let bar_room = format.choose(110.0, 100.0);
+    let lefts = [left + shift, left + 2.0 * shift + bar_room];
+    let second = Projection::new(&at, [lefts[0], TOP], [side, side], 0.5)?;
+    let third = Projection::new(&at, [lefts[1], TOP], [side, side], 0.5)?;
     let scale = limit(places.iter().flat_map(|place| [place.reference.value, place.other.value]));
     let of_change = limit(places.iter().map(|place| place.change.value));
-    let mut drawing =
-        Drawing::new(70.0 + 3.0 * shift + 110.0 + 100.0, TOP + height.max(200.0) + 58.0);
+    let wide = format.choose(70.0 + 3.0 * shift + 110.0 + 100.0, format.width());
+    let mut drawing = Drawing::new(format, [wide, TOP + height.max(format.choose(200.0, 160.0)) + 58.0]);
+    let label = format.choose(LABEL, (side / 8.0) as usize);
+    // Numbers of the smallest size that is read.
+    let cell_px = at.first().map_or(0.0, |place| first.cell(*place)[2]);
+    let with_text = places.len() <= TEXT_LIMIT && (!format.is_print() || cell_px >= LEAST_CELL);
     let maps: [(&Projection, Of, f64, String); 3] = [
-        (&first, |place| place.reference, scale, shortened(&map.pair.reference, LABEL)),
-        (&second, |place| place.other, scale, shortened(&map.pair.other, LABEL)),
+        (&first, |place| place.reference, scale, shortened(&map.pair.reference, label)),
+        (&second, |place| place.other, scale, shortened(&map.pair.other, label)),
         (&third, |place| place.change, of_change, "second less first".to_owned()),
     ];
     for (projection, of, limit, heading) in &maps {
         for place in places {
-            cell(&mut drawing, place, of(place), projection, *limit, places.len() <= TEXT_LIMIT);
+            cell(&mut drawing, place, of(place), projection, *limit, with_text);
         }
         let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
         drawing.text([projection.origin()[0], TOP - 14.0], heading, style, 0.0);
     }
     axes(&mut drawing, &first);
     let tall = height.clamp(160.0, SIDE);
-    let bar = [70.0 + shift + width + 20.0, TOP, 14.0, tall];
+    let bar = [lefts[0] + width + format.choose(20.0, 10.0), TOP, 14.0, tall];
     colour_bar(&mut drawing, bar, scale, "mean W* (m/s)");
-    let bar = [70.0 + 2.0 * shift + 110.0 + width + 20.0, TOP, 14.0, tall];
+    let bar = [lefts[1] + width + format.choose(20.0, 10.0), TOP, 14.0, tall];
     colour_bar(&mut drawing, bar, of_change, "difference (m/s)");
-    let name = format!("compare-maps-{key}");
-    let title = format!("Means of the air by place, {}", pair(&map.pair));
     Some(Figure {
         svg: drawing.finish(&title),
         name,

@@ -10,6 +10,7 @@ use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::MUTED;
 use crate::report::compare_words::pair;
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::text::shortened;
 
@@ -19,7 +20,7 @@ const PANEL: [f64; 2] = [518.0, 350.0];
 const LABEL: usize = 30;
 
 /// The correlations; `None` without any.
-pub(in crate::report) fn figure(of: &StructureComparison, key: &str) -> Option<Figure> {
+pub(in crate::report) fn figure(of: &StructureComparison, key: &str, format: Format) -> Option<Figure> {
     let mut panels = Vec::new();
     if !of.distance.is_empty() {
         panels.push(over_distance(of));
@@ -30,10 +31,10 @@ pub(in crate::report) fn figure(of: &StructureComparison, key: &str) -> Option<F
     if panels.is_empty() {
         return None;
     }
-    let mut sheet = Sheet::new(1040.0, PANEL[1] + 4.0);
-    for (index, panel) in panels.into_iter().enumerate() {
-        sheet.place(panel.draw(PANEL[0], PANEL[1]), index as f64 * 522.0, 0.0);
-    }
+    let panels = panels.into_iter().enumerate();
+    let panels =
+        panels.map(|(index, panel)| (panel, [index as f64 * 522.0, 0.0, PANEL[0], PANEL[1]]));
+    let sheet = Sheet::of(format, [1040.0, PANEL[1] + 4.0], panels.collect());
     let name = format!("compare-correlations-{key}");
     let title = format!("Correlations of the air, {}", pair(&of.pair));
     Some(Figure {

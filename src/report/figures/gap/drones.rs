@@ -10,6 +10,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel, frame};
 use crate::report::colour::{BLUE, GREEN, INK, MUTED};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::usable;
@@ -22,7 +23,7 @@ const MOST_LABELS: usize = 40;
 const FAR: f64 = 2.0;
 
 /// The drones; `None` with fewer than two.
-pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
+pub(in crate::report) fn figure(verdict: &Verdict, format: Format) -> Option<Figure> {
     let each: Vec<&DroneOffset> = verdict
         .drones
         .each
@@ -58,10 +59,13 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     if each.iter().any(|drone| drone.held_out) {
         panel.entry("held out", GREEN, LegendShape::Marker(MarkerShape::Triangle), "");
     }
-    let mut sheet = Sheet::new(SIZE[0], SIZE[1]);
-    sheet.place(panel.draw(SIZE[0], SIZE[1]), 0.0, 0.0);
-    let [left, top, width, height] = frame(SIZE[0], SIZE[1], false);
-    let mut labels = Drawing::overlay();
+    let (size, places) = format.arrange(SIZE, &[[0.0, 0.0, SIZE[0], SIZE[1]]]);
+    let place_in = *places.first()?;
+    let mut sheet = Sheet::new(format, size);
+    let [x_range, y_range] = panel.ranges([place_in[2], place_in[3]]);
+    sheet.place(panel, place_in);
+    let [left, top, width, height] = frame(place_in[2], place_in[3], false);
+    let mut labels = Drawing::overlay(format);
     let sd =
         |of: fn(&DroneOffset) -> f64| rms(each.iter().map(|drone| of(drone))).unwrap_or(f64::NAN);
     let far = [FAR * sd(|drone| drone.offset_us), FAR * sd(|drone| drone.slope)];
@@ -72,8 +76,8 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
         }
         let (px, py) = place(drone);
         let at = [
-            left + width * (px - x.min) / (x.max - x.min) + 7.0,
-            top + height * (y.max - py) / (y.max - y.min) + 4.0,
+            left + width * (px - x_range[0]) / (x_range[1] - x_range[0]) + 7.0,
+            top + height * (y_range[1] - py) / (y_range[1] - y_range[0]) + 4.0,
         ];
         let style = TextStyle { size: 11.5, bold: false, colour: INK, anchor: Anchor::Start };
         labels.text(at, &drone.slot.to_string(), style, 0.0);

@@ -9,17 +9,18 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{INK, MUTED};
+use crate::report::format::Format;
 use crate::report::sheet::Sheet;
 use crate::report::svg::Drawing;
 
-use super::{AFTER, BEFORE, KEY_HEIGHT, OF_95, key, of_unknown, residuals};
+use super::{AFTER, BEFORE, KEY_HEIGHT, OF_95, key, key_left, of_unknown, residuals};
 
 /// Size of a panel, pixels.
 const PANEL: [f64; 2] = [516.0, 400.0];
 const CLIMB_LABEL: &str = "commanded climb speed (m/s)";
 
 /// Measured pulses with both models, and what these leave; `None` without a ladder.
-pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
+pub(in crate::report) fn figure(verdict: &Verdict, format: Format) -> Option<Figure> {
     let rows: Vec<&Regime> =
         verdict.regimes.iter().filter(|row| row.by == Dependence::Climb).collect();
     if rows.is_empty() {
@@ -27,9 +28,9 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     }
     let x = Axis::around(CLIMB_LABEL, rows.iter().map(|row| row.x), 1.0);
     let whole = !verdict.ladder.is_empty();
-    let mut sheet = Sheet::new(1040.0, KEY_HEIGHT + PANEL[1]);
+    let mut panels = Vec::new();
     if whole {
-        sheet.place(pulses(verdict, &x).draw(PANEL[0], PANEL[1]), 0.0, KEY_HEIGHT);
+        panels.push((pulses(verdict, &x), [0.0, KEY_HEIGHT, PANEL[0], PANEL[1]]));
     }
     let most = rows
         .iter()
@@ -40,11 +41,12 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     let mut panel = Panel::new(if whole { "(b) What is left" } else { "" }, x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
     let size = if whole { PANEL } else { [1040.0, PANEL[1]] };
-    residuals(&mut panel, &rows, (0.3 * size[0] / rows.len() as f64).clamp(4.0, 22.0), true);
+    residuals(&mut panel, &rows, (0.3 * size[0].min(format.width()) / rows.len() as f64).clamp(4.0, 22.0), true);
     let left = if whole { 522.0 } else { 0.0 };
-    sheet.place(panel.draw(size[0], size[1]), left, KEY_HEIGHT);
-    let mut over = Drawing::overlay();
-    key(&mut over, [left + 68.0, 14.0]);
+    panels.push((panel, [left, KEY_HEIGHT, size[0], size[1]]));
+    let mut sheet = Sheet::of(format, [1040.0, KEY_HEIGHT + PANEL[1]], panels);
+    let mut over = Drawing::overlay(format);
+    key(&mut over, [key_left(format, left), 14.0]);
     sheet.lay_over(over);
     let name = "gap-ladder".to_owned();
     let title = "The speed ladder with the model before and after".to_owned();

@@ -7,12 +7,13 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::MUTED;
+use crate::report::format::Format;
 use crate::report::gap_words::{of_regimes, regime_axis, regime_title};
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::fixed;
 
-use super::{KEY_HEIGHT, OF_95, key, of_unknown, residuals};
+use super::{KEY_HEIGHT, OF_95, key, key_left, of_unknown, residuals};
 
 /// The regimes in the order in which they are shown.
 pub(in crate::report) const ORDER: [Dependence; 8] = [
@@ -35,7 +36,7 @@ const LEFT: f64 = 68.0;
 const LEAST_SPAN_US: f64 = 4.0;
 
 /// The panels of all regimes that the verdict has; `None` without any.
-pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
+pub(in crate::report) fn figure(verdict: &Verdict, format: Format) -> Option<Figure> {
     let shown: Vec<(Dependence, Vec<&Regime>)> = ORDER
         .into_iter()
         .map(|by| (by, verdict.regimes.iter().filter(|row| row.by == by).collect::<Vec<_>>()))
@@ -48,27 +49,32 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
         scale(shown.iter().filter(|(by, _)| !by.is_of_drones()).flat_map(|(_, rows)| rows));
     let own = scale(shown.iter().filter(|(by, _)| by.is_of_drones()).flat_map(|(_, rows)| rows));
     let height = KEY_HEIGHT + shown.len().div_ceil(2) as f64 * PANEL[1];
-    let mut sheet = Sheet::new(1040.0, height);
-    let mut notes = Drawing::overlay();
-    key(&mut notes, [LEFT, 14.0]);
-    for (index, (by, rows)) in shown.iter().enumerate() {
-        let at = [(index % 2) as f64 * PITCH, KEY_HEIGHT + (index / 2) as f64 * PANEL[1]];
+    let on_page = |index: usize| {
+        let corner = [(index % 2) as f64 * PITCH, KEY_HEIGHT + (index / 2) as f64 * PANEL[1]];
+        [corner[0], corner[1], PANEL[0], PANEL[1]]
+    };
+    let on_page: Vec<[f64; 4]> = (0..shown.len()).map(on_page).collect();
+    let (size, places) = format.arrange([1040.0, height], &on_page);
+    let mut sheet = Sheet::new(format, size);
+    let mut notes = Drawing::overlay(format);
+    key(&mut notes, [key_left(format, LEFT - 68.0), 14.0]);
+    for (index, ((by, rows), at)) in shown.iter().zip(places).enumerate() {
         let scale = if by.is_of_drones() { &own } else { &shared };
         let letter = char::from(b'a' + index as u8);
         let x = abscissa(*by, rows);
         let zero = [(x.min, 0.0), (x.max, 0.0)];
         let mut panel = Panel::new(&format!("({letter}) {}", regime_title(*by)), x, scale.clone());
         panel.line(&zero, MUTED, 1.0, "5 4");
-        let room = PANEL[0] - 100.0;
+        let room = at[2] - 100.0;
         residuals(
             &mut panel,
             rows,
             (0.45 * room / rows.len() as f64).clamp(3.0, 16.0),
             !by.is_of_drones(),
         );
-        sheet.place(panel.draw(PANEL[0], PANEL[1]), at[0], at[1]);
+        sheet.place(panel, at);
         let style = TextStyle { size: 12.0, bold: false, colour: MUTED, anchor: Anchor::End };
-        notes.text([at[0] + PANEL[0] - 16.0, at[1] + 17.0], &note(rows), style, 0.0);
+        notes.text([at[0] + at[2] - 16.0, at[1] + 17.0], &note(rows, format), style, 0.0);
     }
     sheet.lay_over(notes);
     let name = "gap-map".to_owned();
@@ -121,8 +127,12 @@ fn abscissa(by: Dependence, rows: &[&Regime]) -> Axis {
 }
 
 /// Root mean squares before and after, in words.
-fn note(rows: &[&Regime]) -> String {
+fn note(rows: &[&Regime], format: Format) -> String {
     let [before, after] = of_regimes(rows);
+    if format.is_print() {
+        // Beside the title there is room for one of both.
+        return format!("rms {} → {} µs", fixed(before[0], 1), fixed(after[0], 1));
+    }
     format!(
         "rms {} → {} µs ({} → {} m/s)",
         fixed(before[0], 1),

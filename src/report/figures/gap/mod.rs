@@ -11,6 +11,7 @@ use crate::gap::Verdict;
 use crate::gap::verdict::{Finding, Regime, Step};
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, INK, VERMILLION};
+use crate::report::format::Format;
 use crate::report::shapes::Shape;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::usable;
@@ -63,6 +64,15 @@ fn residuals(panel: &mut Panel, rows: &[&Regime], bar_width: f64, chance: bool) 
 
 /// Height of a [`key`], pixels.
 const KEY_HEIGHT: f64 = 28.0;
+
+/// Width of the key, pixels.
+const KEY_WIDTH: f64 = 384.0;
+
+/// Where the key starts above panels that start at `left` on the page, pixels.
+fn key_left(format: Format, left: f64) -> f64 {
+    let above = format.across(left) + 68.0;
+    format.choose(above, above.min(format.width() - KEY_WIDTH))
+}
 
 /// The legend of [`residuals`] in a strip above the panels, where no data is.
 fn key(drawing: &mut Drawing, [x, y]: [f64; 2]) {

@@ -9,6 +9,7 @@ use crate::report::Figure;
 use crate::report::axis::{Axis, nice_step};
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, FAINT, INK, MUTED, RULE, VERMILLION};
+use crate::report::format::Format;
 use crate::report::gap_words::minus;
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
@@ -18,6 +19,11 @@ use super::{AFTER, axis_words};
 
 /// Most rivals that are drawn.
 const RIVALS: usize = 10;
+/// Longest name, letters.
+const LETTERS: usize = 37;
+/// The same of both in print.
+const PRINT_LEFT: f64 = 190.0;
+const PRINT_LETTERS: usize = 25;
 /// Where bars begin, how long the longest is, how far apart they are, pixels.
 const LEFT: f64 = 256.0;
 const LONGEST: f64 = 204.0;
@@ -27,22 +33,31 @@ const TOP: f64 = 44.0;
 const NUMBER: f64 = 40.0;
 
 /// The figure of a step, counted from 1; `None` if there is neither a rival nor a shape.
-pub(in crate::report) fn figure(step: &Step, number: usize) -> Option<Figure> {
+pub(in crate::report) fn figure(step: &Step, number: usize, format: Format) -> Option<Figure> {
     let shape = step.shape.as_ref().filter(|shape| points(shape).len() > 1);
     if step.rivals.is_empty() && shape.is_none() {
         return None;
     }
     let rivals = step.rivals.len().min(RIVALS);
     let height = (TOP + PITCH * rivals as f64 + 62.0).max(330.0);
-    let mut sheet = Sheet::new(1040.0, height);
-    let mut left = 0.0;
+    let left = if rivals > 0 { format.across(522.0) } else { 0.0 };
+    let bars_height = TOP + PITCH * rivals as f64 + 48.0;
+    let wide = format.width();
+    // In one column of print the curve is below the bars.
+    let (place, whole) = match (format.is_narrow(), rivals > 0) {
+        (true, true) => ([0.0, bars_height, wide, 270.0], bars_height + 270.0),
+        (true, false) => ([0.0, 0.0, wide, 290.0], 290.0),
+        (false, _) => ([left, 0.0, wide - 2.0 - left, height], height),
+    };
+    let whole = if shape.is_none() && format.is_print() { bars_height } else { whole };
+    let mut sheet = Sheet::new(format, [wide, whole]);
     if rivals > 0 {
-        sheet.lay_over(bars(step, number));
-        left = 522.0;
+        let room = if format.is_narrow() { wide } else { left };
+        sheet.lay_over(bars(step, number, (room, format)));
     }
     if let Some(shape) = shape {
         let letter = if rivals > 0 { "(b) " } else { "" };
-        sheet.place(curve(shape, letter).draw(1038.0 - left, height), left, 0.0);
+        sheet.place(curve(shape, letter), place);
     }
     let name = format!("gap-step-{number}");
     let title = format!("Step {number}: the rivals and the shape");
@@ -73,8 +88,11 @@ fn is_found(step: &Step, rival: &Rival) -> bool {
     }
 }
 
-fn bars(step: &Step, number: usize) -> Drawing {
-    let mut drawing = Drawing::overlay();
+fn bars(step: &Step, number: usize, (room, format): (f64, Format)) -> Drawing {
+    let mut drawing = Drawing::overlay(format);
+    // Names, bars, and the number behind the longest.
+    let (bars_left, letters) = format.choose((LEFT, LETTERS), (PRINT_LEFT, PRINT_LETTERS));
+    let longest = format.choose(LONGEST, room - bars_left - NUMBER - 22.0);
     let text = |size, colour, anchor, bold| TextStyle { size, bold, colour, anchor };
     drawing.text([0.0, 17.0], "(a) Gain", text(14.0, INK, Anchor::Start, true), 0.0);
     drawing.raw(&format!(
@@ -91,7 +109,8 @@ fn bars(step: &Step, number: usize) -> Drawing {
         .filter(|gain| usable(*gain))
         .fold(1.0, f64::max);
     let at = |gain: f64| {
-        if gain.is_nan() { LEFT } else { LEFT + LONGEST * (gain.clamp(0.0, most) / most).sqrt() }
+        let share = if gain.is_nan() { 0.0 } else { (gain.clamp(0.0, most) / most).sqrt() };
+        bars_left + longest * share
     };
     let line = at(step.threshold_nats);
     let rows = step.rivals.len().min(RIVALS) as f64;
@@ -103,7 +122,7 @@ fn bars(step: &Step, number: usize) -> Drawing {
         drawing.text([x, bottom + 16.0], &short_gain(tick), style, 0.0);
     }
     let label = text(13.0, INK, Anchor::Middle, false);
-    drawing.text([LEFT + LONGEST / 2.0, bottom + 38.0], "gain (nats)", label, 0.0);
+    drawing.text([bars_left + longest / 2.0, bottom + 38.0], "gain (nats)", label, 0.0);
     for (index, rival) in step.rivals.iter().take(RIVALS).enumerate() {
         let y = TOP + PITCH * index as f64;
         let found = is_found(step, rival);
@@ -114,14 +133,14 @@ fn bars(step: &Step, number: usize) -> Drawing {
             clean(&rival.name)
         };
         let style = text(12.0, INK, Anchor::End, found);
-        drawing.text([LEFT - 8.0, y + 13.5], &shortened(&words, 37), style, 0.0);
+        drawing.text([bars_left - 8.0, y + 13.5], &shortened(&words, letters), style, 0.0);
         let end = at(rival.gain_nats);
         let (fill, stroke) = match (found, rival.generic) {
             (true, _) => (BLUE, ""),
             (false, true) => (hatch.as_str(), "stroke=\"#b4bcc4\""),
             (false, false) => ("#93a1ae", ""),
         };
-        drawing.rect([LEFT, y + 2.0, (end - LEFT).max(1.0), PITCH - 8.0], fill, stroke);
+        drawing.rect([bars_left, y + 2.0, (end - bars_left).max(1.0), PITCH - 8.0], fill, stroke);
         // Beside the line of the threshold, not on it.
         let number_at = if end < line + 2.0 && end + NUMBER > line { line } else { end };
         let style = text(12.0, MUTED, Anchor::Start, false);
@@ -134,12 +153,10 @@ fn bars(step: &Step, number: usize) -> Drawing {
         "stroke-width=\"1.6\" stroke-dasharray=\"5 3\"",
     );
     let words = format!("threshold {}", short_gain(step.threshold_nats));
-    drawing.text(
-        [line + 4.0, TOP - 12.0],
-        &words,
-        text(12.0, VERMILLION, Anchor::Start, false),
-        0.0,
-    );
+    let is_far = format.is_print() && line + 100.0 > room;
+    let (shift, anchor) = if is_far { (-4.0, Anchor::End) } else { (4.0, Anchor::Start) };
+    let style = text(12.0, VERMILLION, anchor, false);
+    drawing.text([line + shift, TOP - 12.0], &words, style, 0.0);
     drawing
 }
 
