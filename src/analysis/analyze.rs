@@ -362,6 +362,8 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         planned: input.plan.is_some(),
         orientation_deg: input.plan.map(|plan| plan.site.orientation_deg),
         site,
+        site_name: input.plan.and_then(|plan| plan.site_name.clone()),
+        utc_offset_h: input.plan.and_then(|plan| plan.utc_offset_h),
         simulated: input.simulated,
         true_updraft_mps: input.true_updraft_mps,
         logs: input.logs.len(),

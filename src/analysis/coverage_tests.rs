@@ -181,6 +181,8 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         indicator: Indicator::Pulse,
         orientation_deg: None,
         site: None,
+        site_name: None,
+        utc_offset_h: None,
         simulated: false,
         statistics: None,
         wind_legs: None,

@@ -70,6 +70,12 @@ pub struct FlightAnalysis {
     /// Place on the globe; absent: neither a plan nor a log says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<FlightSite>,
+    /// Name of the place, as the plan has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site_name: Option<String>,
+    /// Local time there less UTC, h, as the plan has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utc_offset_h: Option<f64>,
     /// Whether the simulator wrote the logs.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub simulated: bool,

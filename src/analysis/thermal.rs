@@ -58,7 +58,7 @@ impl Thermal {
         };
         format!(
             "a thermal at ({:.0} ± {:.0}, {:.0} ± {:.0}) m at {:.0} s{moves}: {:.2} ± {:.2} m/s in the \
-             core, radius {:.0} ± {:.0} m, {:.0} ± {:.0} m³/s",
+             core, radius {:.0} ± {:.0} m, {:.0} ± {:.0} m³/s (95 %)",
             x.value,
             half(x),
             y.value,

@@ -23,6 +23,12 @@ pub(super) struct MissionArgs {
     /// Latitude and longitude of the grid's centre, degrees
     #[arg(long, value_name = "LAT,LON", value_parser = parse_origin, allow_hyphen_values = true)]
     pub(super) origin: Option<(f64, f64)>,
+    /// Name of the place, for people: reports begin with it
+    #[arg(long, value_name = "NAME")]
+    pub(super) site: Option<String>,
+    /// Local time there less UTC, h, as 2 or -3.5 (without it reports give mean solar time)
+    #[arg(long, value_name = "H", value_parser = hours, allow_hyphen_values = true)]
+    pub(super) utc_offset: Option<f64>,
     /// Ground height above mean sea level, m
     #[arg(long, value_name = "M", value_parser = metres, allow_hyphen_values = true)]
     pub(super) ground: Option<f64>,
@@ -86,6 +92,10 @@ fn degrees(text: &str) -> Result<f64, String> {
     number(text, "degrees")
 }
 
+fn hours(text: &str) -> Result<f64, String> {
+    number(text, "hours")
+}
+
 fn speed(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "speeds in m/s with commas between them: 0.5,1,1.5".to_owned())
 }
@@ -113,6 +123,12 @@ impl MissionArgs {
         }
         if let Some((lat, lon)) = self.origin {
             list.push(Override::new("site.origin", vec![lat, lon]));
+        }
+        if let Some(name) = &self.site {
+            list.push(Override::new("site.name", name.clone()));
+        }
+        if let Some(offset_h) = self.utc_offset {
+            list.push(Override::new("site.utc_offset_h", offset_h));
         }
         if let Some(vehicle) = &self.vehicle {
             list.push(Override::new("vehicle", vehicle.clone()));

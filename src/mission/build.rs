@@ -29,6 +29,11 @@ pub fn build_plan(
             .with_help("use letters, digits, `-` and `_`, at most 60"));
     }
     let site = site(&source)?;
+    let site_name = site_name(&source)?;
+    let offset = template.site.utc_offset_h.as_ref();
+    let utc_offset_h = offset
+        .map(|offset| source.in_range(offset, "local time less UTC", "h", -12.0..=14.0))
+        .transpose()?;
     let (grid, mut slots) = lay_out(&source)?;
     assign_groups(&source, &mut slots)?;
     let groups = groups(&source)?;
@@ -47,6 +52,8 @@ pub fn build_plan(
         purpose: template.purpose,
         vehicle: vehicle.name.clone(),
         site,
+        site_name,
+        utc_offset_h,
         limits,
         fence,
         grid: Some(grid),
@@ -55,6 +62,19 @@ pub fn build_plan(
         duration_ms,
         briefing: template.briefing.clone(),
     })
+}
+
+/// Longest name of a place, characters.
+const LONGEST_NAME: usize = 80;
+
+fn site_name(source: &Source<'_>) -> Result<Option<String>, TemplateError> {
+    let Some(name) = &source.template.site.name else { return Ok(None) };
+    let text = name.get_ref().trim();
+    if text.chars().count() > LONGEST_NAME {
+        let what = format!("the place's name is longer than {LONGEST_NAME} characters");
+        return Err(source.error(span_of(name), what).with_help("it stands in headings"));
+    }
+    Ok((!text.is_empty()).then(|| text.to_owned()))
 }
 
 fn site(source: &Source<'_>) -> Result<Site, TemplateError> {

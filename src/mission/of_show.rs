@@ -68,6 +68,8 @@ impl Plan {
             purpose: if ladder { Purpose::Calibration } else { Purpose::Measurement },
             vehicle: vehicle.name.clone(),
             site: site(show),
+            site_name: None,
+            utc_offset_h: None,
             fence: fence(show, &limits),
             limits,
             grid: None,

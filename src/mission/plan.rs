@@ -28,6 +28,12 @@ pub struct Plan {
     pub vehicle: String,
     /// Where the show frame is.
     pub site: Site,
+    /// Name of the place, for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site_name: Option<String>,
+    /// Local time there less UTC, h.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utc_offset_h: Option<f64>,
     /// Limits that the plan is checked against.
     pub limits: Limits,
     /// Fence around the show, show frame.

@@ -110,6 +110,12 @@ pub struct FlightTemplate {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SiteTemplate {
+    /// Name of the place, for people.
+    #[serde(default)]
+    pub name: Option<Spanned<String>>,
+    /// Local time there less UTC, h.
+    #[serde(default)]
+    pub utc_offset_h: Option<Spanned<f64>>,
     /// Latitude and longitude of the show origin, degrees.
     pub origin: Spanned<[f64; 2]>,
     /// Ground height above mean sea level, m.

@@ -458,6 +458,10 @@ pub struct TiltWind {
     pub from_deg: Option<f64>,
     /// Mean lean of the fleet, degrees.
     pub lean_deg: f64,
+    /// Change of the speed by a trim error of 0.2 degrees, m/s: it is not in the speed's own error, as all drones may
+    /// have it alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trim_se_mps: Option<f64>,
     /// The drones.
     pub drones: Vec<DroneWind>,
     /// In a sentence.

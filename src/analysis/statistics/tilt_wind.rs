@@ -152,11 +152,14 @@ pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
             digits(lean_deg)
         ),
     };
+    let at = |lean_deg: f64| drag.speed_mps(lean_deg.to_radians().tan());
+    let trim_se_mps =
+        at(lean_deg + TRIM_DEG).zip(at(lean_deg)).map(|(more, speed)| (more - speed).abs());
     let drag_speed_mps = match drag {
         LeanDrag::Faces(speed_mps) => Some(speed_mps),
         _ => None,
     };
-    Some(TiltWind { drag_speed_mps, speed_mps, from_deg, lean_deg, drones, words })
+    Some(TiltWind { drag_speed_mps, speed_mps, from_deg, lean_deg, trim_se_mps, drones, words })
 }
 
 #[cfg(test)]

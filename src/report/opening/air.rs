@@ -5,6 +5,7 @@ use crate::analysis::law::Symbol;
 use crate::analysis::result::{FlightAnalysis, UpdraftMap};
 use crate::analysis::statistics::result::TiltWind;
 use crate::analysis::statistics::tilt_wind::DRAG_SHARE;
+use crate::analysis::thermal::Thermal;
 use crate::base::estimate::Estimate;
 use crate::report::figures::air::{mean, mean_truth};
 use crate::report::fleet_air::fleet_air;
@@ -15,7 +16,7 @@ use crate::report::text::{
 };
 use crate::report::{headline, posterior};
 
-use super::extremes::extremes;
+use super::extremes::{Extremes, moment};
 use super::place::{duration, when};
 
 /// Standard errors to each side of a normal 95 % interval.
@@ -74,6 +75,7 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
     let mut said = Vec::new();
     let name =
         if several { format!("{}: ", capitalised(&clean(&flight.name))) } else { String::new() };
+    let extremes = Extremes::of(flight, map);
     let over =
         when(flight).map_or_else(String::new, |when| format!(" and {}", duration(when.length_s())));
     if let Some(mean) = Mean::of(map) {
@@ -91,9 +93,13 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
                 mean.words(),
             )
         } else {
+            let so = if extremes.varies || !map.thermals.is_empty() {
+                "This mean cannot be told from zero, though the air did rise and sink, in places and at times"
+            } else {
+                "That cannot be told from zero: the air may have risen, sunk or rested"
+            };
             format!(
-                "{name}In the mean over {whole}{over} the vertical speed of the air was {}. That cannot be told \
-                 from zero: the air may have risen, sunk or rested.",
+                "{name}In the mean over {whole}{over} the vertical speed of the air was {}. {so}.",
                 mean.words(),
             )
         });
@@ -102,20 +108,32 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
     } else {
         said.push(format!("{name}No mean of the vertical air speed can be told."));
     }
-    said.extend(extremes(flight, map));
+    said.extend(extremes.sentences());
     said.extend(map.thermals.first().map(|thermal| {
         let n = map.thermals.len();
         let them = if n == 1 { "A thermal was".to_owned() } else { format!("{n} thermals were") };
         let peak = thermal.peak_mps;
+        let which = if n == 1 { "" } else { ", the most certain one" };
         format!(
-            "{them} found{}: {} m/s more in the core than around it, {} m in radius.",
-            if n == 1 { "" } else { ", the most certain one with" },
+            "{them} found{which}{} at {}: {} m/s more in the core than around it, {} m in radius (standard errors).",
+            of_core(flight, thermal),
+            moment(when(flight), thermal.time_s),
             estimate(peak),
             estimate(thermal.radius_m),
         )
     }));
     said.push(wind_sentence(flight.statistics.as_ref().and_then(|found| found.wind.as_ref())));
     said
+}
+
+/// ` 40 m north-east of the show's origin`; nothing where directions are not known.
+fn of_core(flight: &FlightAnalysis, thermal: &Thermal) -> String {
+    let [x, y] = thermal.core_m.map(|of| of.value);
+    let known = flight.orientation_deg.filter(|deg| usable(*deg) && usable(x + y));
+    known.map_or_else(String::new, |forward_deg| {
+        let bearing = forward_deg - y.atan2(x).to_degrees();
+        format!(" {} m {} of the show's origin", fixed(x.hypot(y), 0), compass(bearing))
+    })
 }
 
 /// Of a map whose zero is none of a calibration's.
@@ -160,12 +178,17 @@ fn wind_sentence(wind: Option<&TiltWind>) -> String {
             fixed(wind.lean_deg, 1)
         );
     };
-    if speed.value < LEAST_WIND_MPS {
-        return "There was no wind to speak of, by the lean of the drones.".to_owned();
+    let trim = wind.trim_se_mps.filter(|trim| usable(*trim)).unwrap_or(0.0);
+    if speed.value < LEAST_WIND_MPS.max(trim) {
+        let below = fixed(LEAST_WIND_MPS.max(2.0 * trim), 1);
+        return format!(
+            "There was no wind to speak of: below {below} m/s, as far as the lean of the drones can tell."
+        );
     }
     // A box's drag is the simulator's own.
     let share = if wind.drag_speed_mps.is_some() { 0.0 } else { DRAG_SHARE };
-    let with_drag = Estimate::new(speed.value, speed.se.hypot(share * speed.value));
+    let se = speed.se.hypot(share * speed.value).hypot(trim);
+    let with_drag = Estimate::new(speed.value, se);
     let of = if share > 0.0 { ", whose drag is known to a third or so" } else { "" };
     format!("The wind was {} m/s{from}, by the lean of the drones{of}.", estimate(with_drag))
 }
@@ -247,7 +270,8 @@ fn fitted_w(flight: &FlightAnalysis) -> Option<String> {
         .map_or_else(String::new, |truth| format!("; the true one was {} m/s", signed(truth, 2)));
     usable(w.value).then(|| {
         format!(
-            "By the shape of that law, the air's own vertical speed was {} m/s{truth}.",
+            "By the shape of that law alone, W* was {} m/s{truth}. The error is that of the fit: a shape that \
+             is not quite the drones' own moves W* by several times as much, so that it is no measurement of the air.",
             signed_estimate(w)
         )
     })

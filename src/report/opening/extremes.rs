@@ -1,5 +1,7 @@
 //! The strongest and the weakest air: where, and when.
 
+use statrs::distribution::{ContinuousCDF as _, Normal};
+
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 use crate::base::estimate::Estimate;
 use crate::numeric::median;
@@ -13,48 +15,91 @@ const NORMAL: f64 = 1.96;
 /// A drone closer to the origin than this stands on it, m.
 const AT_ORIGIN_M: f64 = 1.0;
 
-/// Sentences on both.
-pub(super) fn extremes(flight: &FlightAnalysis, map: &UpdraftMap) -> Vec<String> {
-    let mut said = Vec::new();
-    let places = map.drones.iter().filter_map(|drone| {
-        let mean = drone.posterior_mean.unwrap_or(drone.mean);
-        usable(mean.value).then_some((mean, drone))
-    });
-    if let Some([(high, at_high), (low, at_low)]) = ends(places) {
-        let at = |drone: &DroneUpdraft| place(flight, drone);
-        said.push(format!(
-            "Over the whole time the air was highest at {} with {} m/s and lowest at {} with {} m/s.{}",
-            at(at_high),
-            signed_estimate(high),
-            at(at_low),
-            signed_estimate(low),
-            if is_shared(map) {
-                " All drones share most of these errors: differences between them are known better."
-            } else {
-                ""
-            },
-        ));
+/// The extremes of a map that are more than noise.
+pub(super) struct Extremes {
+    said: Vec<String>,
+    /// The air was not the same everywhere and always.
+    pub(super) varies: bool,
+}
+
+impl Extremes {
+    /// Looks for them: of as many values as there are, the highest and the lowest differ by chance, too.
+    pub(super) fn of(flight: &FlightAnalysis, map: &UpdraftMap) -> Self {
+        let places = map.drones.iter().filter_map(|drone| {
+            let mean = drone.posterior_mean.unwrap_or(drone.mean);
+            usable(mean.value).then_some((mean, drone))
+        });
+        let when = when(flight);
+        let seconds = map.drones.iter().flat_map(|drone| {
+            map.time_s.iter().enumerate().filter_map(move |(index, time_s)| {
+                let value = second(drone, index)?;
+                usable(value.value).then_some((value, (drone, *time_s)))
+            })
+        });
+        let mut said = Vec::new();
+        let mut varies = false;
+        match ends(places.clone()) {
+            Some([(high, at_high), (low, at_low)]) if differ(map, [high, low], places.count()) => {
+                varies = true;
+                let at = |drone: &DroneUpdraft| place(flight, drone);
+                said.push(format!(
+                    "Over the whole time the vertical speed was largest at {} with {} m/s and smallest at {} with {} \
+                     m/s.{}",
+                    at(at_high),
+                    signed_estimate(high),
+                    at(at_low),
+                    signed_estimate(low),
+                    if is_shared(map) {
+                        " All drones share most of these errors: differences between them are known better."
+                    } else {
+                        ""
+                    },
+                ));
+            }
+            Some(_) => said.push(
+                "Between the drones no difference over the whole time can be told from chance."
+                    .to_owned(),
+            ),
+            None => {}
+        }
+        if let Some([(high, at_high), (low, at_low)]) = ends(seconds.clone())
+            // Ten seconds are about one independent value.
+            && differ(map, [high, low], seconds.count() / 10)
+        {
+            varies = true;
+            let at = |(drone, time_s): (&DroneUpdraft, f64)| {
+                format!("{} at {}", label(drone), moment(when, time_s))
+            };
+            said.push(format!(
+                "The strongest 10 s were {} m/s ({}), the weakest {} m/s ({}).",
+                signed_estimate(high),
+                at(at_high),
+                signed_estimate(low),
+                at(at_low),
+            ));
+        }
+        Self { said, varies }
     }
-    let when = when(flight);
-    let seconds = map.drones.iter().flat_map(|drone| {
-        map.time_s.iter().enumerate().filter_map(move |(index, time_s)| {
-            let value = second(drone, index)?;
-            usable(value.value).then_some((value, (drone, *time_s)))
-        })
-    });
-    if let Some([(high, at_high), (low, at_low)]) = ends(seconds) {
-        let at = |(drone, time_s): (&DroneUpdraft, f64)| {
-            format!("{} at {}", label(drone), moment(when, time_s))
-        };
-        said.push(format!(
-            "The strongest 10 s were {} m/s ({}), the weakest {} m/s ({}).",
-            signed_estimate(high),
-            at(at_high),
-            signed_estimate(low),
-            at(at_low),
-        ));
+
+    /// Sentences on both.
+    pub(super) fn sentences(self) -> Vec<String> {
+        self.said
     }
-    said
+}
+
+/// Whether the highest and the lowest of so many values differ by more than the errors that they do not share.
+fn differ(map: &UpdraftMap, ends: [Estimate; 2], values: usize) -> bool {
+    let common = map.common.map_or(0.0, |common| common.se_mps).powi(2);
+    let own = |of: &Estimate| {
+        let rest = of.se.powi(2) - common;
+        // Where the fleet's share is told otherwise than in this value's error, half of it is its own.
+        if rest > 0.0 { rest.sqrt() } else { 0.5 * of.se }
+    };
+    // Intervals that hold all of the values at once (Bonferroni).
+    let share = 0.025 / values.max(2) as f64;
+    let width = Normal::standard().inverse_cdf(1.0 - share);
+    let [high, low] = &ends;
+    high.value - low.value > width * (own(high) + own(low))
 }
 
 /// The highest and the lowest; `None` below two.
@@ -111,7 +156,7 @@ fn place(flight: &FlightAnalysis, drone: &DroneUpdraft) -> String {
 }
 
 /// `12:03:20 UTC`, else `96 s of show time`.
-fn moment(when: Option<When>, time_s: f64) -> String {
+pub(super) fn moment(when: Option<When>, time_s: f64) -> String {
     when.and_then(|when| when.unix_s(time_s)).map_or_else(
         || format!("{} s of show time", fixed(time_s, 0)),
         |unix_s| format!("{} UTC", day_and_time(unix_s).1),

@@ -12,6 +12,8 @@ use super::SUMMED_FLIGHTS;
 
 /// Places closer than this are one, degrees of latitude or longitude (a hundred metres or less).
 const SAME_PLACE_DEG: f64 = 0.001;
+/// Nobody measures the air lower than this, m.
+const LEAST_HEIGHT_M: f64 = 0.5;
 /// Heights closer than this are one height, m.
 const SAME_HEIGHT_M: f64 = 3.0;
 
@@ -28,7 +30,8 @@ impl When {
     /// Unix time of a show time, s; `None` where logs do not tell.
     pub(in crate::report) fn unix_s(self, show_s: f64) -> Option<i64> {
         let zero = self.zero?.to_unix_ms();
-        usable(show_s).then(|| zero.saturating_add((1000.0 * show_s) as i64).div_euclid(1000))
+        let nearest = |show_s: f64| zero.saturating_add((1000.0 * show_s).round() as i64 + 500);
+        usable(show_s).then(|| nearest(show_s).div_euclid(1000))
     }
 
     /// Length, s.
@@ -82,7 +85,8 @@ pub(super) fn circumstances(analysis: &Analysis) -> Vec<String> {
     if flights.iter().any(|flight| flight.simulated) {
         said.push(
             if flights.iter().all(|flight| flight.simulated) {
-                "Nothing was flown outdoors: drones, air and clock are the simulator's."
+                "Nothing was flown outdoors: drones, air and clock, which begins anew with each flight, are the \
+                 simulator's."
             } else {
                 "Of simulated flights, drones, air and clock are the simulator's."
             }
@@ -123,6 +127,8 @@ fn place(flights: &[FlightAnalysis]) -> String {
             && (site.lon_deg - first.lon_deg).abs() < SAME_PLACE_DEG
     };
     // A plan knows the ground's height, which first fixes do not.
+    let mut names = flights.iter().filter_map(|flight| flight.site_name.as_deref()).map(clean);
+    let name = names.next().map_or_else(String::new, |name| format!("{name}, "));
     let shown = sites.iter().find(|site| site.planned).unwrap_or(first);
     let of = if shown.planned { "" } else { " (the drones' first fixes)" };
     let apart = if sites.iter().all(near) {
@@ -130,7 +136,7 @@ fn place(flights: &[FlightAnalysis]) -> String {
     } else {
         ", and elsewhere: the flights are of several places"
     };
-    format!("at {}{of}{apart}", site_words(shown))
+    format!("at {name}{}{of}{apart}", site_words(shown))
 }
 
 /// `Hover: 2026-06-02 12:00 to 12:02 UTC, 1 min 49 s at 100 m above the ground, by 15 of 16 drones.`
@@ -150,7 +156,7 @@ fn flight_sentence(flight: &FlightAnalysis) -> String {
         (Some(from), Some(to)) => {
             let ((day, from), (last_day, to)) = (day_and_time(from), day_and_time(to));
             let to = if day == last_day { to } else { format!("{last_day} {to}") };
-            format!("{day} {from} to {to} UTC")
+            format!("{day} {from} to {to} UTC{}", local(flight, when))
         }
         _ => "when is not known (the logs have no GPS time)".to_owned(),
     };
@@ -161,12 +167,35 @@ fn flight_sentence(flight: &FlightAnalysis) -> String {
     format!("{name}: {clock}, {}{what}{drones}.", duration(when.length_s()))
 }
 
+/// ` (14:00 to 14:07 local time)`: by the plan's offset, else by the mean sun at its longitude, which is what convection
+/// goes by.
+fn local(flight: &FlightAnalysis, when: When) -> String {
+    let by_sun = || flight.site.map(|site| site.lon_deg / 15.0).filter(|h| usable(*h));
+    let (offset_h, which) = match flight.utc_offset_h.filter(|h| usable(*h)) {
+        Some(offset_h) => (Some(offset_h), "local time"),
+        None => (by_sun(), "mean solar time"),
+    };
+    let at = |show_s: f64| {
+        let unix_s = when.unix_s(show_s)? + (3600.0 * offset_h?).round() as i64;
+        day_and_time(unix_s).1.get(..5).map(str::to_owned)
+    };
+    match (at(when.span_s[0]), at(when.span_s[1])) {
+        (Some(from), Some(to)) if from == to => format!(" ({from} {which})"),
+        (Some(from), Some(to)) => format!(" ({from} to {to} {which})"),
+        _ => String::new(),
+    }
+}
+
 /// ` at 100 m above the ground`
 fn heights(flight: &FlightAnalysis) -> String {
     let Some(map) = &flight.map else { return String::new() };
     let all = map.drones.iter().map(|drone| drone.height_m).filter(|m| usable(*m));
     let Some((low, high)) = extent(all) else { return String::new() };
     let moved = if map.is_scan() { " on tracks" } else { "" };
+    // Tables without heights have zeros.
+    if high < LEAST_HEIGHT_M && low > -LEAST_HEIGHT_M {
+        return moved.to_owned();
+    }
     if high - low < SAME_HEIGHT_M {
         format!("{moved} at {} m above take-off", fixed(f64::midpoint(low, high), 0))
     } else {

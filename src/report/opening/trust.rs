@@ -31,6 +31,7 @@ pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
             )
         };
         doubts.extend(lost(flight).map(of));
+        doubts.extend(damaged(flight).map(of));
         doubts.extend(flight.warnings.iter().map(doubt).map(of));
         doubts.extend(flight.map.as_ref().and_then(largest_error).map(of));
         doubts.extend(flight.map.as_ref().and_then(too_narrow).map(of));
@@ -43,6 +44,16 @@ pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
         said.push(format!("{} more with the flights below.", count(left, "caution")));
     }
     said
+}
+
+/// Logs that are not whole.
+fn damaged(flight: &FlightAnalysis) -> Option<Doubt> {
+    let words = match flight.partly_used.len() {
+        0 => return None,
+        1 => "One log is damaged or ends in the air: what is left of it is used.".to_owned(),
+        n => format!("{n} logs are damaged or end in the air: what is left of them is used."),
+    };
+    Some((2, words))
 }
 
 /// Drones without a result.

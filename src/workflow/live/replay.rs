@@ -104,18 +104,14 @@ pub(crate) fn replay(
 fn chosen<'a>(work: &'a Work, name: Option<&str>) -> Result<&'a Found, WorkflowError> {
     let names =
         || work.flights.iter().map(|found| found.name.as_str()).collect::<Vec<_>>().join(", ");
-    match name {
-        Some(name) => work.flights.iter().find(|found| found.name == name).ok_or_else(|| {
+    if let Some(name) = name {
+        return work.flights.iter().find(|found| found.name == name).ok_or_else(|| {
             WorkflowError::Usage(format!("the campaign has no flight \"{name}\", but {}", names()))
-        }),
-        None => {
-            let logged = work.flights.iter().rev().find(|found| !found.logs.is_empty());
-            let flown = |found: &&Found| found.start.is_some();
-            logged
-                .or_else(|| work.flights.iter().rev().find(flown))
-                .ok_or_else(|| nothing(&names()))
-        }
+        });
     }
+    let logged = work.flights.iter().rev().find(|found| !found.logs.is_empty());
+    let flown = |found: &&Found| found.start.is_some();
+    logged.or_else(|| work.flights.iter().rev().find(flown)).ok_or_else(|| nothing(&names()))
 }
 
 fn nothing(names: &str) -> WorkflowError {
