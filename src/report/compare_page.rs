@@ -10,8 +10,8 @@ use crate::compare::result::{
 use super::compare_terminal::title;
 use super::compare_words as words;
 use super::figures::compare::{drones, laws, maps, structure};
-use super::format::Format;
 use super::fill::{common, fill};
+use super::format::Format;
 use super::text::{NONE, clean, count, estimate, slug, unit};
 use super::{Figure, Provenance, Report, ReportError};
 
@@ -169,7 +169,10 @@ fn law_section(law: &LawComparison, index: usize, figures: &mut Figures) -> Valu
             }
         })
         .collect();
-    let shown = [figures.show(laws::figure(law, &key, figures.format)), figures.show(drones::figure(law, &key, figures.format))];
+    let shown = [
+        figures.show(laws::figure(law, &key, figures.format)),
+        figures.show(drones::figure(law, &key, figures.format)),
+    ];
     context! {
         heading => words::pair(&law.pair),
         law => clean(&law.law),
