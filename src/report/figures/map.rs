@@ -1,7 +1,7 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
 use super::air::{mean, mean_truth};
-use super::map_marks::{MARKS_HEIGHT, NEXT_ROW, ground, ground_words, marks};
+use super::map_marks::{CELLS, MARKS_HEIGHT, NEXT_ROW, ground, ground_words, marks};
 use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
 use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, FlightAnalysis, UpdraftMap};
 use crate::base::estimate::Estimate;
@@ -31,6 +31,8 @@ struct Room {
     decimals: Option<usize>,
     /// Whether error and slot stand beside it.
     all: bool,
+    /// Whether the ground shows behind it, without a style sheet that says so.
+    see_through: bool,
 }
 
 impl Room {
@@ -38,7 +40,7 @@ impl Room {
     fn of(format: Format, cell_px: f64, decimals: usize) -> Self {
         if !format.is_print() {
             let decimals = (cell_px >= VALUE_PX).then_some(decimals);
-            return Self { decimals, all: cell_px >= ERROR_PX };
+            return Self { decimals, all: cell_px >= ERROR_PX, see_through: false };
         }
         // A sign, a digit and the point beside them, in the smallest text that is read.
         let fits = |decimals: usize| {
@@ -47,7 +49,7 @@ impl Room {
                 <= cell_px
         };
         let decimals = [decimals, decimals.min(2)].into_iter().find(|decimals| fits(*decimals));
-        Self { decimals, all: decimals.is_some() && cell_px >= PRINT_ERROR_PX }
+        Self { decimals, all: decimals.is_some() && cell_px >= PRINT_ERROR_PX, see_through: false }
     }
 }
 
@@ -189,6 +191,7 @@ pub(in crate::report) fn mean_map(
     // As many decimals as the largest error asks for, the same in all cells.
     let largest = map.drones.iter().map(|drone| means.of(drone).se).filter(|se| usable(*se));
     let text = Room::of(format, cell_px, error_decimals(largest.fold(0.0, f64::max)));
+    let text = Room { see_through: basemap.is_some() && format.is_print(), ..text };
     for (slot, home) in &empty {
         empty_cell(&mut drawing, *slot, projection.cell(*home), text);
     }
@@ -401,7 +404,12 @@ fn mean_cell(
             drone.mapping.name(),
         ),
     );
-    drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
+    let more = if text.see_through {
+        format!("rx=\"2\" fill-opacity=\"{CELLS}\"")
+    } else {
+        "rx=\"2\"".to_owned()
+    };
+    drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, &more);
     if let Some(decimals) = text.decimals {
         let colour = if usable(mean.value) { ink_on_diverging(place) } else { MUTED };
         let style = |size: f64, bold| TextStyle { size, bold, colour, anchor: Anchor::Middle };

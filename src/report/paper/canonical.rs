@@ -145,16 +145,17 @@ mod tests {
         let mut places = BTreeMap::new();
         for (id, object) in objects {
             places.insert(id, text.len());
-            text.push_str(&format!("{id} 0 obj\n{object}\nendobj\n\n"));
+            let _ = write!(text, "{id} 0 obj\n{object}\nendobj\n\n");
         }
         let table = text.len();
         text.push_str("xref\n0 6\n0000000000 65535 f\r\n");
         for place in places.values() {
-            text.push_str(&format!("{place:010} 00000 n\r\n"));
+            let _ = write!(text, "{place:010} 00000 n\r\n");
         }
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             "trailer\n<<\n  /Size 6\n  /Root 1 0 R\n  /Info 5 0 R\n>>\nstartxref\n{table}\n%%EOF"
-        ));
+        );
         text.into_bytes()
     }
 

@@ -8,10 +8,11 @@ mod font;
 mod pdf;
 mod plain;
 
+use svg2pdf::usvg::Error as SvgError;
 use thiserror::Error;
 
 use super::format::{Format, PAGE_HEIGHT_MM};
-use super::{Beside, compare_page, gap_page, page};
+use super::{Basemap, Beside, compare_page, gap_page, page};
 use crate::analysis::result::Analysis;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
@@ -48,7 +49,7 @@ pub enum PaperError {
         /// Name of the figure.
         name: String,
         /// What is wrong with it.
-        source: svg2pdf::usvg::Error,
+        source: SvgError,
     },
     /// There is no PDF of it.
     #[error("failed to make a PDF of figure {name}: {reason} (please report this as a bug)")]
@@ -60,8 +61,11 @@ pub enum PaperError {
     },
 }
 
-/// The figures of an analysis' report for a column of `width_mm`.
+/// The figures of an analysis' report for a column of `width_mm`; a picture of the ground in WebP is not below them.
 pub fn of_analysis(analysis: &Analysis, beside: Beside<'_>, width_mm: f64) -> Vec<Drawn> {
+    // PDF knows no WebP.
+    let is_known = |basemap: &&Basemap| !basemap.address().starts_with("data:image/webp");
+    let beside = Beside { basemap: beside.basemap.filter(is_known), ..beside };
     drawn(page::figures(analysis, beside, Format::column(width_mm)), width_mm)
 }
 

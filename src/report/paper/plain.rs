@@ -2,6 +2,7 @@
 //! that its font has not.
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 
 /// Stands for a character that the font has not.
 const MISSING: char = '\u{fffd}';
@@ -68,7 +69,7 @@ fn push_tag(out: &mut String, tag: &str, name: &str) {
         let (lead, attribute) = before.rsplit_once(char::is_whitespace).unwrap_or(("", before));
         out.push_str(lead.trim_end());
         if let Some((attribute, value)) = known(attribute, value) {
-            out.push_str(&format!(" {attribute}=\"{value}\""));
+            let _ = write!(out, " {attribute}=\"{value}\"");
         }
         if name == "svg" && attribute == "xmlns" {
             out.push_str(" xmlns:xlink=\"http://www.w3.org/1999/xlink\"");
@@ -84,11 +85,10 @@ fn known<'a>(attribute: &'a str, value: &'a str) -> Option<(&'a str, &'a str)> {
     }
     Some(match (attribute, value) {
         ("style", "image-rendering:pixelated") => ("image-rendering", "optimizeSpeed"),
-        ("style", _) => return None,
+        ("style" | "role", _) => return None,
         ("href", _) => ("xlink:href", value),
         ("fill", "transparent") => ("fill", "none"),
         ("font-weight", "600" | "700") => ("font-weight", "bold"),
-        ("role", _) => return None,
         _ => (attribute, value),
     })
 }

@@ -18,7 +18,7 @@ const LISTED: usize = 8;
 /// What became of the figures of one width.
 #[derive(Default)]
 struct Written {
-    written: usize,
+    count: usize,
     unreadable: Vec<String>,
     too_high: Vec<String>,
     missing: Vec<char>,
@@ -74,7 +74,7 @@ fn together(finished: Vec<(String, Option<Kept>)>) -> Written {
             all.unreadable.push(name);
             continue;
         };
-        all.written += 1;
+        all.count += 1;
         all.missing.extend(missing);
         if is_too_high {
             all.too_high.push(name);
@@ -86,10 +86,10 @@ fn together(finished: Vec<(String, Option<Kept>)>) -> Written {
 }
 
 fn tell(host: &dyn Host, width_mm: f64, all: &Written, folder: &Path) {
-    let figures = if all.written == 1 { "figure" } else { "figures" };
+    let figures = if all.count == 1 { "figure" } else { "figures" };
     host.say(&format!(
         "{} {figures} {width_mm} mm wide, as SVG and PDF -> {}",
-        all.written,
+        all.count,
         folder.shown()
     ));
     if !all.unreadable.is_empty() {
