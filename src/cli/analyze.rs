@@ -10,6 +10,7 @@ use super::analyze_each;
 use super::basemap_args::BasemapArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::files_args::FilesArgs;
 use super::origin::OriginChoice;
 use super::shard_args::ShardArgs;
 use super::words;
@@ -23,7 +24,7 @@ use crate::flight::Indicator;
 use crate::report::{Basemap, NO_EDGE, terminal_summary};
 use crate::workflow::analyze::each::record_path;
 use crate::workflow::analyze::{
-    Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
+    Analysed, Analysing, Files, Request, Settings, Uncorrected as Without, gather, simulated,
 };
 use crate::workflow::basemap::shows_work;
 use crate::workflow::clock::Stopwatch;
@@ -90,6 +91,8 @@ pub(super) struct AnalyzeArgs {
     basemap: BasemapArgs,
     #[command(flatten)]
     sharing: ShardArgs,
+    #[command(flatten)]
+    files: FilesArgs,
     #[command(flatten)]
     options: AnalyzeOptions,
 }
@@ -232,7 +235,8 @@ impl AnalyzeOptions {
         options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
-        Settings { options, without, combine: self.indicator == IndicatorChoice::All }
+        let combine = self.indicator == IndicatorChoice::All;
+        Settings { options, without, combine, files: Files::default() }
     }
 }
 
@@ -265,7 +269,7 @@ impl AnalyzeArgs {
 
     /// What all of them have in common: settings, held laws, share.
     pub(super) fn common(&self) -> (Settings, Option<&Path>, Share) {
-        (self.options.settings(), self.hold.as_deref(), self.sharing.share())
+        (self.files.of(self.options.settings()), self.hold.as_deref(), self.sharing.share())
     }
 
     /// The response and the level that tables are inverted with, if that was asked for.
@@ -318,31 +322,31 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         None => Some(request.output()?),
     };
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
-    finish(context, &work, &options, args.hold.as_deref(), (output.as_deref(), basemap))
+    let settings = args.files.of(options.settings());
+    finish(context, &work, &settings, args.hold.as_deref(), (output.as_deref(), basemap))
 }
 
 /// Analyses a campaign into its own folder; the last step of `updraft run`.
 pub(super) fn analyze_campaign(
     context: &Context,
     root: &Path,
-    options: &AnalyzeOptions,
+    settings: &Settings,
     basemap: Option<Basemap>,
 ) -> Result<Exit, CommandError> {
     // What was just flown here.
-    finish(context, &simulated(root)?, options, None, (Some(root), basemap))
+    finish(context, &simulated(root)?, settings, None, (Some(root), basemap))
 }
 
 /// Analyses, and prints what came of it.
 fn finish(
     context: &Context,
     work: &Work,
-    options: &AnalyzeOptions,
+    settings: &Settings,
     hold: Option<&Path>,
     (output, basemap): (Option<&Path>, Option<Basemap>),
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
-    let settings = options.settings();
-    let analysing = Analysing::begin(context, work, &settings, hold)?;
+    let analysing = Analysing::begin(context, work, settings, hold)?;
     // Tables and quiet runs say it with the other warnings.
     if let Some(doubts) = analysing.doubts().filter(|_| context.json && !context.quiet) {
         context.warn(doubts);

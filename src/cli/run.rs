@@ -9,6 +9,7 @@ use super::basemap_args::BasemapArgs;
 use super::check::few;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::files_args::FilesArgs;
 use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
 use super::simulate::{AirArgs, AirSpecs, air_help, air_specs, speed, updraft};
@@ -79,6 +80,8 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     basemap: BasemapArgs,
     #[command(flatten)]
+    files: FilesArgs,
+    #[command(flatten)]
     hide: HideArgs,
     #[command(flatten)]
     air: AirArgs,
@@ -108,8 +111,8 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     if flown.ending == Ending::NoGo {
         return Ok(Exit::Unsafe);
     }
-    let options = AnalyzeOptions::of_run(args.estimate.plain);
-    let exit = analyze_campaign(context, &args.output, &options, basemap)?;
+    let settings = args.files.of(AnalyzeOptions::of_run(args.estimate.plain).settings());
+    let exit = analyze_campaign(context, &args.output, &settings, basemap)?;
     context.say(&format!("Done in {watch}"));
     Ok(if flown.ending == Ending::Losses { Exit::Losses } else { exit })
 }

@@ -450,6 +450,8 @@ pub(crate) fn hover() -> FlightAnalysis {
             posterior_mean: None,
             quality: Vec::new(),
             truth_mps: Some(truth),
+            place: None,
+            wind: None,
         }));
         drones.push(DroneAnalysis {
             slot: Some(slot),
