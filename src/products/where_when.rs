@@ -61,8 +61,10 @@ impl<'a> WhereWhen<'a> {
         // Times that count from each drone's own take-off have no common zero.
         let starts = flight.drones.iter().filter(|drone| drone.clock.method != Alignment::Takeoff);
         let starts = starts.filter_map(|drone| drone.clock.start);
+        let by_show = flight.drones.iter().any(|drone| drone.clock.method == Alignment::ShowRows);
         let zero = upper_median(starts.map(|start| start.total_ms() as f64).collect())
-            .and_then(|ms| GpsTime::from_total_ms(ms as i64));
+            .map(|ms| if by_show { whole_second_ms(ms as i64) } else { ms as i64 })
+            .and_then(GpsTime::from_total_ms);
         // A show of another program may have no place, and stands at 0, 0.
         let origin =
             flight.site.and_then(|site| site.origin_deg()).filter(|origin| *origin != [0.0; 2]);
@@ -148,8 +150,31 @@ impl<'a> WhereWhen<'a> {
     }
 }
 
+/// The whole second that a show began on: the firmware is told its start in whole seconds of GPS time, and logs show it
+/// early by what the receivers' time is late. A start that is no whole second stays as it is.
+fn whole_second_ms(ms: i64) -> i64 {
+    let second = (ms + 500).div_euclid(1000) * 1000;
+    if (second - ms).abs() <= ONE_CLOCK_MS { second } else { ms }
+}
+
 /// UTC of a show time that began at `zero`, ms since 1970.
 fn after(zero: GpsTime, time_s: f64) -> Option<i64> {
     let ms = (1000.0 * time_s).round();
     (ms.abs() < 1e15).then(|| zero.to_unix_ms().saturating_add(ms as i64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_show_begins_on_a_whole_second_unless_its_logs_say_otherwise() {
+        let second = 1_450_000_000_000;
+        for ms in [second, second - 250, second + 120] {
+            assert_eq!(whole_second_ms(ms), second);
+        }
+        for ms in [second + 251, second - 400, second + 500] {
+            assert_eq!(whole_second_ms(ms), ms, "its start was given by hand");
+        }
+    }
 }

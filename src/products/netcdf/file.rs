@@ -82,6 +82,8 @@ impl File {
     ) -> Result<(), NetcdfError> {
         let variable = self.builder.add_char_variable(name, &dimensions.map(|one| one.id))?;
         self.describe(variable, &dimensions, attributes)?;
+        // So that readers make text of it, not bytes.
+        self.builder.add_variable_attribute(variable, "_Encoding", text("utf-8"))?;
         Ok(self.builder.write_char_variable_strings(variable, values)?)
     }
 

@@ -20,12 +20,10 @@ const MOST_NAMED: usize = 40;
 /// Extent of a file's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
-    /// Latitude, longitude, degrees, and height, m: lowest and highest.
+    /// Latitude, longitude, degrees, and height above take-off, m: lowest and highest.
     pub(super) lat_deg: [f64; 2],
     pub(super) lon_deg: [f64; 2],
     pub(super) height_m: [f64; 2],
-    /// Whether heights are above mean sea level, or above the ground.
-    pub(super) is_amsl: bool,
     /// First and last time, ms of UTC since 1970.
     pub(super) utc_ms: [i64; 2],
     /// Time between values, s.
@@ -53,8 +51,7 @@ pub(super) fn write(
     about: &About<'_>,
     (analysis, origin): (&Analysis, &Origin),
 ) -> Result<(), NetcdfError> {
-    let Extent { lat_deg, lon_deg, height_m, is_amsl, utc_ms: [from_ms, to_ms], step_s } =
-        about.extent;
+    let Extent { lat_deg, lon_deg, height_m, utc_ms: [from_ms, to_ms], step_s } = about.extent;
     let program = words::program(analysis, origin);
     let [from, to] = [iso(from_ms), iso(to_ms)];
     let command = if origin.command.is_empty() {
@@ -88,7 +85,7 @@ pub(super) fn write(
             "vertical wind velocity, updraft, thermal, turbulence, unmanned aerial vehicle, swarm"
                 .to_owned(),
         ),
-        ("standard_name_vocabulary", "CF Standard Name Table v92".to_owned()),
+        ("standard_name_vocabulary", "CF Standard Name Table v93".to_owned()),
         (
             "platform",
             if simulated { "simulated multirotor drones" } else { "multirotor drones" }.to_owned(),
@@ -108,10 +105,11 @@ pub(super) fn write(
         ("time_coverage_resolution", format!("PT{step_s}S")),
         ("geospatial_vertical_positive", "up".to_owned()),
         ("geospatial_vertical_units", "m".to_owned()),
-        (
-            "geospatial_vertical_reference",
-            if is_amsl { "mean sea level" } else { "take-off" }.to_owned(),
-        ),
+        ("geospatial_vertical_reference", "take-off".to_owned()),
+        ("geospatial_bounds", polygon(lat_deg, lon_deg)),
+        ("geospatial_bounds_crs", "EPSG:4326".to_owned()),
+        ("creator_name", clean(&origin.institution)),
+        ("creator_type", if origin.institution.is_empty() { "" } else { "institution" }.to_owned()),
         ("geospatial_lat_units", "degrees_north".to_owned()),
         ("geospatial_lon_units", "degrees_east".to_owned()),
     ];
@@ -135,6 +133,14 @@ pub(super) fn write(
     }
     let flights = fields::ids(analysis);
     file.global("flights", text(flights.join(", ")))
+}
+
+/// The rectangle around all values, by latitude and longitude, as well-known text.
+fn polygon([south, north]: [f64; 2], [west, east]: [f64; 2]) -> String {
+    let corners = [[south, west], [south, east], [north, east], [north, west], [south, west]];
+    let corners: Vec<String> =
+        corners.iter().map(|[lat, lon]| format!("{lat:.7} {lon:.7}")).collect();
+    format!("POLYGON (({}))", corners.join(", "))
 }
 
 /// Plans, vehicles and records, one to a line as `sha256sum` writes them.

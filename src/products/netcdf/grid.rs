@@ -4,7 +4,7 @@ use netcdf_writer::NcAttrValue;
 
 use super::file::{Attribute, Dimension, File, floats, text};
 use super::globals::{self, About, Extent};
-use super::trajectories::time_attributes;
+use super::trajectories::{beside, time_attributes};
 use super::{Format, NetcdfError};
 use crate::analysis::result::{Analysis, FlightAnalysis, PosteriorGrid, UpdraftMap};
 use crate::base::frame::{ShowFrame, WGS84_A_M};
@@ -149,12 +149,10 @@ fn extent_of(
 ) -> Option<Extent> {
     let places = || layout.shown_m().filter_map(|place| here.lat_lon_deg(place));
     let (lat, lon) = (extent(places().map(|deg| deg[0]))?, extent(places().map(|deg| deg[1]))?);
-    let amsl_m = here.amsl_m(grid.height_m);
     Some(Extent {
         lat_deg: [lat.0, lat.1],
         lon_deg: [lon.0, lon.1],
-        height_m: [amsl_m.unwrap_or(grid.height_m); 2],
-        is_amsl: amsl_m.is_some(),
+        height_m: [grid.height_m; 2],
         utc_ms: [*times.first()?, *times.last()?],
         step_s: STEP_S,
     })
@@ -207,10 +205,7 @@ fn axes(
         along("projection_x_coordinate", east, "forward in the show frame, along the rows", "X");
     file.variable("y", &[y], &y_is, (y_m, None))?;
     file.variable("x", &[x], &x_is, (x_m, None))?;
-    let shown = [
-        ("long_name", text("show time: since the start of the flight's show")),
-        ("units", text("s")),
-    ];
+    let shown = beside("show time: since the start of the flight's show", "s");
     file.variable("show_time", &[time], &shown, (&grid.time_s, None))?;
     Ok(dims)
 }
@@ -325,6 +320,7 @@ fn values(
             ("units", text("m s-1")),
             ("grid_mapping", text("crs")),
             ("coordinates", text(coordinates.as_str())),
+            ("coverage_content_type", text(content(name))),
         ];
         if name == "w" {
             attributes.push(("ancillary_variables", text("w_se")));
@@ -348,6 +344,7 @@ fn values(
             ("units", text("m s-1")),
             ("ancillary_variables", text(se)),
             ("cell_methods", text("time: mean")),
+            ("coverage_content_type", text(content(name))),
         ];
         let values = floats(&winds, |wind| Some((*wind)?.east_north_mps[axis]));
         file.variable(name, &dims[..1], &attributes, (&values, Some(f32::NAN)))?;
@@ -355,9 +352,15 @@ fn values(
             ("standard_name", text(format!("{standard} standard_error"))),
             ("long_name", text(format!("standard error of {name}, from drag and trim"))),
             ("units", text("m s-1")),
+            ("coverage_content_type", text(content(se))),
         ];
         let values = floats(&winds, |wind| Some((*wind)?.se_mps[axis]));
         file.variable(se, &dims[..1], &attributes, (&values, Some(f32::NAN)))?;
     }
     Ok(())
+}
+
+/// Kind of a variable, by ACDD.
+fn content(name: &str) -> &'static str {
+    if name.ends_with("_se") { "qualityInformation" } else { "physicalMeasurement" }
 }

@@ -6,6 +6,7 @@
 mod file;
 mod globals;
 mod grid;
+mod speeds;
 mod trajectories;
 
 use thiserror::Error;

@@ -1,39 +1,17 @@
 //! All drones: one trajectory for each drone of each flight.
 
-use netcdf_writer::NcAttrValue;
-
-use super::file::{File, floats, longest, text};
+use super::file::{Attribute, File, floats, longest, text};
 use super::globals::{self, About, Extent};
-use super::{Format, NetcdfError};
+use super::{Format, NetcdfError, speeds};
 use crate::analysis::result::Analysis;
 use crate::numeric::extent;
 use crate::products::Origin;
-use crate::products::fields::{FILLED, FieldRow, rows};
+use crate::products::fields::{FieldRow, rows};
 
 /// Half of the time that a value is a mean of, s.
 const HALF_S: f64 = 5.0;
-/// Flags of a value, each a bit from the lowest on; the names are those of the tables.
-const FLAGS: [&str; 10] = [
-    "saturation",
-    "low_battery",
-    "gap",
-    "incomplete",
-    "manoeuvre",
-    "misaligned",
-    "drift",
-    "no_voltage",
-    "beyond_ladder",
-    FILLED,
-];
-
 /// Coordinates of all values along trajectories.
 const COORDINATES: &str = "time lat lon height";
-
-/// Bits of a row's flags.
-fn bits(row: &FieldRow) -> i16 {
-    let bit = |name: &str| FLAGS.iter().position(|flag| *flag == name).map_or(0, |bit| 1 << bit);
-    row.flags.split(';').map(bit).fold(0, |bits: i16, bit| bits | bit)
-}
 
 /// Rows in a row of one drone.
 struct Trajectory {
@@ -115,7 +93,7 @@ pub(super) fn file(
     };
     globals::write(&mut file, &about, (analysis, origin))?;
     instances(&mut file, &trajectories)?;
-    observations(&mut file, &rows, &trajectories, extent.is_amsl)?;
+    observations(&mut file, &rows, &trajectories)?;
     Ok((Some(file.finish()?), left_out))
 }
 
@@ -128,13 +106,11 @@ fn extent_of(rows: &[FieldRow]) -> Option<Extent> {
     let degrees =
         |axis: usize| extent(rows.iter().filter_map(|row| Some(row.fix.lat_lon_deg?.0[axis])));
     let (lat, lon) = (degrees(0)?, degrees(1)?);
-    let amsl = extent(rows.iter().filter_map(|row| row.fix.amsl_m));
-    let height = amsl.or_else(|| extent(rows.iter().filter_map(|row| row.fix.height_m)))?;
+    let height = extent(rows.iter().filter_map(|row| row.fix.height_m))?;
     Some(Extent {
         lat_deg: [lat.0, lat.1],
         lon_deg: [lon.0, lon.1],
         height_m: [height.0, height.1],
-        is_amsl: amsl.is_some(),
         utc_ms: [low_ms, high_ms],
         step_s: 1,
     })
@@ -163,8 +139,9 @@ fn instances(file: &mut File, trajectories: &[Trajectory]) -> Result<(), NetcdfE
         file.texts(name, [instance, length], &attributes, &values)?;
     }
     let slots: Vec<i32> = trajectories.iter().map(|one| one.slot.map_or(-1, i32::from)).collect();
-    let slot = [("long_name", text("slot number of the drone in the plan")), ("units", text("1"))];
-    file.variable("slot", &[instance], &slot, (&slots, Some(-1)))?;
+    let slot = beside("slot number of the drone in the plan", "1");
+    let unplanned = slots.contains(&-1).then_some(-1);
+    file.variable("slot", &[instance], &slot, (&slots, unplanned))?;
     let counts: Vec<i32> = trajectories.iter().map(|one| one.count as i32).collect();
     let attributes = [
         ("long_name", text("number of observations of the trajectory")),
@@ -179,8 +156,8 @@ fn observations(
     file: &mut File,
     rows: &[FieldRow],
     trajectories: &[Trajectory],
-    is_amsl: bool,
 ) -> Result<(), NetcdfError> {
+    let is_amsl = rows.iter().any(|row| row.fix.amsl_m.is_some());
     let obs = file.dimension("obs", rows.len())?;
     let ends = file.dimension("bound", 2)?;
     let seconds = |row: &FieldRow| row.utc_ms.unwrap_or_default() as f64 / 1000.0;
@@ -231,47 +208,34 @@ fn observations(
         COORDINATES.to_owned()
     };
     let show: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
-    let of_show = [
-        ("long_name", text("show time: since the start of the flight's show")),
-        ("units", text("s")),
-    ];
+    let of_show = beside("show time: since the start of the flight's show", "s");
     file.variable("show_time", &[obs], &of_show, (&show, None))?;
     let index: Vec<i32> = (0_i32..)
         .zip(trajectories)
         .flat_map(|(index, one)| std::iter::repeat_n(index, one.count))
         .collect();
-    let of_index = [
-        ("long_name", text("number of the trajectory, from 0: for selecting")),
-        ("units", text("1")),
-    ];
+    let of_index = beside("number of the trajectory, from 0: for selecting", "1");
     file.variable("trajectory_index", &[obs], &of_index, (&index, None))?;
 
-    for value in values(rows) {
-        let mut attributes = vec![("long_name", text(value.long_name)), ("units", text("m s-1"))];
-        attributes.extend(
-            (!value.standard_name.is_empty()).then(|| ("standard_name", text(value.standard_name))),
-        );
-        attributes.push(("coordinates", text(coordinates.as_str())));
-        attributes.extend(
-            (!value.ancillary.is_empty()).then(|| ("ancillary_variables", text(value.ancillary))),
-        );
-        attributes.extend(value.is_mean.then(|| ("cell_methods", text("time: mean"))));
-        file.variable(value.name, &[obs], &attributes, (&floats(rows, value.get), Some(f32::NAN)))?;
+    for speed in speeds::of(rows) {
+        let attributes = speed.attributes(&coordinates);
+        file.variable(speed.name, &[obs], &attributes, (&floats(rows, speed.get), Some(f32::NAN)))?;
     }
-    let masks: Vec<i16> = (0..FLAGS.len()).map(|bit| 1 << bit).collect();
-    let attributes = [
-        ("standard_name", text("quality_flag")),
-        ("long_name", text("doubts about w; 0: none")),
-        ("flag_masks", NcAttrValue::Shorts(masks)),
-        ("flag_meanings", text(FLAGS.join(" "))),
-        ("coordinates", text(coordinates)),
-    ];
-    let flags: Vec<i16> = rows.iter().map(bits).collect();
-    file.variable("w_flag", &[obs], &attributes, (&flags, None))
+    let flags: Vec<i16> = rows.iter().map(speeds::bits).collect();
+    file.variable("w_flag", &[obs], &speeds::flag_attributes(&coordinates), (&flags, None))
+}
+
+/// Attributes of a number that goes with the others.
+pub(super) fn beside(long_name: &str, units: &str) -> Vec<Attribute<'static>> {
+    vec![
+        ("long_name", text(long_name)),
+        ("units", text(units)),
+        ("coverage_content_type", text("auxiliaryInformation")),
+    ]
 }
 
 /// Attributes of a time of UTC.
-pub(super) fn time_attributes(bounds: &str) -> Vec<(&'static str, NcAttrValue)> {
+pub(super) fn time_attributes(bounds: &str) -> Vec<Attribute<'static>> {
     vec![
         ("standard_name", text("time")),
         ("long_name", text("UTC in the middle of the 10 s that values are means of")),
@@ -281,119 +245,4 @@ pub(super) fn time_attributes(bounds: &str) -> Vec<(&'static str, NcAttrValue)> 
         ("axis", text("T")),
         ("bounds", text(bounds)),
     ]
-}
-
-/// A speed of each second.
-struct Speed {
-    name: &'static str,
-    standard_name: &'static str,
-    long_name: &'static str,
-    ancillary: &'static str,
-    is_mean: bool,
-    get: fn(&FieldRow) -> Option<f64>,
-}
-
-/// The speeds that any row has.
-fn values(rows: &[FieldRow]) -> Vec<Speed> {
-    let speed = |name, standard_name, long_name, get| Speed {
-        name,
-        standard_name,
-        long_name,
-        ancillary: "",
-        is_mean: false,
-        get,
-    };
-    let mean = |speed: Speed, ancillary| Speed { ancillary, is_mean: true, ..speed };
-    let w = "upward_air_velocity";
-    let all = [
-        mean(speed("w", w, "vertical air speed, up positive", |row| row.w_mps), "w_se w_flag"),
-        speed(
-            "w_se",
-            "upward_air_velocity standard_error",
-            "standard error of w, all errors included",
-            |row| row.w_se_mps,
-        ),
-        speed("w_noise", "", "standard error of w from the drone's own noise alone", |row| {
-            row.sd_mps
-        }),
-        mean(
-            speed(
-                "w_posterior",
-                w,
-                "vertical air speed by all drones, seconds and the calibration together",
-                |row| row.posterior_mps,
-            ),
-            "w_posterior_se",
-        ),
-        speed(
-            "w_posterior_se",
-            "upward_air_velocity standard_error",
-            "standard deviation of w_posterior, all errors included",
-            |row| row.posterior_sd_mps,
-        ),
-        mean(
-            speed(
-                "w_true",
-                w,
-                "true vertical air speed of the simulation, or by instruments beside the drone",
-                |row| row.truth_mps,
-            ),
-            "",
-        ),
-        mean(
-            speed("u", "eastward_wind", "wind towards true east, by the drone's lean", |row| {
-                Some(row.wind_mps?[0])
-            }),
-            "u_se",
-        ),
-        speed(
-            "u_se",
-            "eastward_wind standard_error",
-            "standard error of u, from drag and trim",
-            |row| Some(row.wind_se_mps?[0]),
-        ),
-        mean(
-            speed("v", "northward_wind", "wind towards true north, by the drone's lean", |row| {
-                Some(row.wind_mps?[1])
-            }),
-            "v_se",
-        ),
-        speed(
-            "v_se",
-            "northward_wind standard_error",
-            "standard error of v, from drag and trim",
-            |row| Some(row.wind_se_mps?[1]),
-        ),
-    ];
-    // The first two and the wind are always there, so that programs find them; others only with values.
-    let always = ["w", "w_se", "u", "u_se", "v", "v_se"];
-    let used =
-        |one: &Speed| always.contains(&one.name) || rows.iter().any(|row| (one.get)(row).is_some());
-    all.into_iter().filter(used).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::analysis::result::Quality;
-
-    #[test]
-    fn each_flag_of_an_analysis_has_its_bit() {
-        // A new kind of doubt must get a bit, at the end.
-        let all = [
-            Quality::Saturation,
-            Quality::LowBattery,
-            Quality::Gap,
-            Quality::Incomplete,
-            Quality::Manoeuvre,
-            Quality::Misaligned,
-            Quality::Drift,
-            Quality::NoVoltage,
-            Quality::BeyondLadder,
-        ];
-        for (bit, quality) in all.into_iter().enumerate() {
-            let name = serde_json::to_value(quality).unwrap();
-            assert_eq!(name.as_str(), Some(FLAGS[bit]));
-        }
-    }
 }
