@@ -15,8 +15,10 @@ use super::updraft::DroneSeries;
 use crate::flight::{Flight, PlaceBy, Series};
 use crate::numeric::{mean, upper_median};
 
-/// Places are not joined over longer silences than this, s. Chosen.
+/// Channels are not joined over longer silences than this, s, and places, which receivers may tell once a second.
+/// Chosen.
 const GAP_S: f64 = 1.0;
+const PLACE_GAP_S: f64 = 3.0;
 /// Half of the time that a place is a mean of, s.
 const HALF_S: f64 = 0.5;
 /// Steps in which values are kept: 1 cm on the globe, 1 mm, 1 mm/s.
@@ -97,10 +99,6 @@ fn rounded(value: f64, steps: f64) -> f64 {
 
 /// `None`: the log knows neither a place nor a height.
 fn place(flight: &Flight, times: impl Iterator<Item = f64> + Clone) -> Option<DronePlace> {
-    let around = |series: &Series, time_s: f64| {
-        let within = mean(series.between(time_s - HALF_S, time_s + HALF_S));
-        within.or_else(|| series.at(time_s, GAP_S))
-    };
     let height_m: Vec<Option<f64>> = times
         .clone()
         .map(|time_s| Some(rounded(around(&flight.height_m, time_s)?, STEPS_PER_M)))
@@ -119,7 +117,7 @@ fn place(flight: &Flight, times: impl Iterator<Item = f64> + Clone) -> Option<Dr
     let homes = homes.filter_map(|(time, amsl_m)| Some(amsl_m - flight.height_m.at(*time, GAP_S)?));
     Some(DronePlace {
         by: globe.by,
-        lat_lon_deg: times.map(|time_s| degrees(around_place, time_s)).collect(),
+        lat_lon_deg: times.map(|time_s| degrees(around, time_s)).collect(),
         height_m,
         home_lat_lon_deg: begins_s.and_then(|begins_s| degrees(nearest, begins_s)),
         home_amsl_m: upper_median(homes.collect()).map(|amsl_m| rounded(amsl_m, STEPS_PER_M)),
@@ -127,17 +125,21 @@ fn place(flight: &Flight, times: impl Iterator<Item = f64> + Clone) -> Option<Dr
 }
 
 /// Mean over the second around a time, else what lies between the samples beside it.
-fn around_place(series: &Series, time_s: f64) -> Option<f64> {
+fn around(series: &Series, time_s: f64) -> Option<f64> {
     // A longitude that jumps at the date line has no mean.
     let values = series.between(time_s - HALF_S, time_s + HALF_S);
     let jumps = values.windows(2).any(|pair| (pair[0] - pair[1]).abs() > 180.0);
-    if jumps { values.first().copied() } else { mean(values).or_else(|| series.at(time_s, GAP_S)) }
+    if jumps {
+        values.first().copied()
+    } else {
+        mean(values).or_else(|| series.at(time_s, PLACE_GAP_S))
+    }
 }
 
 /// Value at a time, or the first one after it if it is near.
 fn nearest(series: &Series, time_s: f64) -> Option<f64> {
     let next = series.time_s.partition_point(|time| *time < time_s);
-    let near = series.time_s.get(next).is_some_and(|time| time - time_s <= GAP_S);
+    let near = series.time_s.get(next).is_some_and(|time| time - time_s <= PLACE_GAP_S);
     series.value.get(next).copied().filter(|_| near)
 }
 

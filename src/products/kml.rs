@@ -110,7 +110,7 @@ pub fn kml(analysis: &Analysis) -> Option<String> {
     for (class, colour) in COLOURS.iter().enumerate() {
         let _ = writeln!(
             out,
-            "<Style id=\"w{class}\"><IconStyle><color>{colour}</color><scale>1.1</scale><Icon><href>http://maps.google.com/mapfiles/kml/shapes/shaded_dot.png</href></Icon></IconStyle><LineStyle><color>80ffffff</color></LineStyle></Style>"
+            "<Style id=\"w{class}\"><IconStyle><color>{colour}</color><scale>1.1</scale></IconStyle><LineStyle><color>80ffffff</color></LineStyle></Style>"
         );
     }
     let _ = writeln!(

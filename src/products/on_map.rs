@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::fields::ids;
-use super::where_when::{Fix, WhereWhen};
+use super::where_when::{Fix, WhereWhen, wrapped_deg};
 use super::words::clean;
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, Trace, UpdraftMap};
 use crate::base::frame::metres_per_degree;
@@ -61,6 +61,14 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Mean longitude, on the near side of the date line.
+fn middle_deg(mut lons_deg: impl Iterator<Item = f64>) -> Option<f64> {
+    let first = lons_deg.next()?;
+    let off =
+        mean(std::iter::once(0.0).chain(lons_deg.map(|lon_deg| wrapped_deg(lon_deg - first))))?;
+    Some(wrapped_deg(first + off))
+}
+
 fn spot(
     flight: &FlightAnalysis,
     id: &str,
@@ -75,7 +83,7 @@ fn spot(
     let place = Place {
         lat_lon_deg: [
             over(|fix| Some(fix.lat_lon_deg?.0[0]))?,
-            over(|fix| Some(fix.lat_lon_deg?.0[1]))?,
+            middle_deg(fixes.iter().filter_map(|fix| Some(fix.lat_lon_deg?.0[1])))?,
         ],
         height_m: over(|fix| fix.height_m)?,
         amsl_m: over(|fix| fix.amsl_m),
@@ -136,8 +144,10 @@ fn flown(
     places
         .filter_map(|(moved, height_m)| {
             let [north_m, east_m] = (*moved)?;
-            let lat_lon_deg =
-                [lat_deg + north_m / north_m_per_deg, lon_deg + east_m / east_m_per_deg];
+            let lat_lon_deg = [
+                lat_deg + north_m / north_m_per_deg,
+                wrapped_deg(lon_deg + east_m / east_m_per_deg),
+            ];
             let known = lat_lon_deg.iter().chain([height_m]).all(|value| value.is_finite());
             let amsl_m = here.amsl_m_of(drone, *height_m);
             known.then_some(Place { lat_lon_deg, height_m: *height_m, amsl_m })
@@ -217,5 +227,11 @@ mod tests {
         assert_eq!(thinned(&turn), turn);
         assert_eq!(thinned(&[]), []);
         assert_eq!(thinned(&turn[..1]), turn[..1]);
+    }
+
+    #[test]
+    fn the_middle_of_both_sides_of_the_date_line_is_on_it() {
+        let found = middle_deg([179.999, -179.999, 180.0].into_iter()).unwrap();
+        assert!((found.abs() - 180.0).abs() < 1e-9, "{found}");
     }
 }

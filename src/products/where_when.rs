@@ -128,7 +128,8 @@ impl<'a> WhereWhen<'a> {
     /// A place of the show frame (x forward, y left), degrees.
     pub fn lat_lon_deg(&self, [x_m, y_m]: [f64; 2]) -> Option<[f64; 2]> {
         let place = self.frame?.to_geodetic(Vector3::new(x_m, y_m, 0.0));
-        Some([place.lat_deg, place.lon_deg]).filter(|deg| deg.iter().all(|deg| deg.is_finite()))
+        let deg = [place.lat_deg, wrapped_deg(place.lon_deg)];
+        deg.iter().all(|deg| deg.is_finite()).then_some(deg)
     }
 
     /// Height above mean sea level of a height above take-off, m.
@@ -150,6 +151,11 @@ impl<'a> WhereWhen<'a> {
     }
 }
 
+/// A longitude between -180 and 180 degrees, for places beyond the date line.
+pub(super) fn wrapped_deg(lon_deg: f64) -> f64 {
+    if lon_deg.abs() <= 180.0 { lon_deg } else { (lon_deg + 180.0).rem_euclid(360.0) - 180.0 }
+}
+
 /// The whole second that a show began on: the firmware is told its start in whole seconds of GPS time, and logs show it
 /// early by what the receivers' time is late. A start that is no whole second stays as it is.
 fn whole_second_ms(ms: i64) -> i64 {
@@ -166,6 +172,14 @@ fn after(zero: GpsTime, time_s: f64) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_beyond_the_date_line_are_on_its_other_side() {
+        assert_eq!(
+            [179.5, -180.0, 180.5, -180.25].map(wrapped_deg),
+            [179.5, -180.0, -179.5, 179.75]
+        );
+    }
 
     #[test]
     fn a_show_begins_on_a_whole_second_unless_its_logs_say_otherwise() {

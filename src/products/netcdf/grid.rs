@@ -2,7 +2,7 @@
 
 use netcdf_writer::NcAttrValue;
 
-use super::file::{Attribute, Dimension, File, floats, text};
+use super::file::{Dimension, File, floats, text};
 use super::globals::{self, About, Extent};
 use super::trajectories::{beside, time_attributes};
 use super::{Format, NetcdfError};
@@ -11,7 +11,6 @@ use crate::base::frame::{ShowFrame, WGS84_A_M};
 use crate::numeric::extent;
 use crate::products::fields_grid::FleetWind;
 use crate::products::{Origin, WhereWhen, clean};
-use nalgebra::Vector3;
 
 /// Half of the time that a value is a mean of, s, and the time between them.
 const HALF_S: f64 = 5.0;
@@ -19,7 +18,7 @@ const STEP_S: u32 = 10;
 /// Inverse flattening of the WGS 84 ellipsoid.
 const INVERSE_FLATTENING: f64 = 298.257_223_563;
 /// A show frame that is turned by less than this against the points of the compass is not, degrees.
-const ALIGNED_DEG: f64 = 1e-6;
+const ALIGNED_DEG: f64 = 1e-3;
 
 /// What becomes of a flight.
 pub(super) enum Made {
@@ -55,8 +54,8 @@ pub(super) fn file(
         summary: "Posterior mean of the vertical air speed on a grid over a swarm of drones, as means over 10 s, with its \
                   standard deviation: what all drones, seconds and the calibration tell together.",
         comment: "w is up positive. w_se holds all errors, those that all cells share as well. Cells that drones say nothing \
-                  about are missing. x and y are metres to the east and north of the origin of crs; in the file of a fleet that \
-                  stands askew they are metres along its rows, and easting and northing tell where that is.",
+                  about are missing. x and y are metres in the projection of crs: towards east and north where the rows of the \
+                  fleet point along the compass, else across and along its rows.",
         feature_type: "",
         data_type: "Grid",
         extent,
@@ -88,29 +87,32 @@ fn grid_of(flight: &FlightAnalysis) -> Option<(&UpdraftMap, &PosteriorGrid)> {
     whole.then_some((map, grid))
 }
 
-/// How rows and columns of the file lie in the grid.
+/// How rows and columns of the file lie in the grid: its axes are those of a projection.
 struct Layout {
-    frame: ShowFrame,
     /// Coordinates along the file's y and x, m.
     axes: [Vec<f64>; 2],
     /// Which of the grid's axes (0: x, 1: y) the file's y and x are, and whether they run backwards.
     of: [(usize, bool); 2],
-    /// Whether y and x are north and east.
-    is_aligned: bool,
+    /// Direction of the file's y axis, degrees clockwise from north, between -90 and 90; absent: it is north.
+    azimuth_deg: Option<f64>,
     grid: [Vec<f64>; 2],
 }
 
 impl Layout {
     fn of(grid: &PosteriorGrid, frame: ShowFrame) -> Self {
-        let quarters = frame.orientation_deg / 90.0;
+        let turned_deg = frame.orientation_deg.rem_euclid(360.0);
+        let quarters = turned_deg / 90.0;
         let is_aligned = (quarters - quarters.round()).abs() * 90.0 < ALIGNED_DEG;
-        // north = cos x + sin y, east = sin x - cos y.
-        let of = match (is_aligned, quarters.round().rem_euclid(4.0) as u8) {
-            (false, _) => [(1, false), (0, false)],
-            (true, 0) => [(0, false), (1, true)],
-            (true, 1) => [(1, false), (0, false)],
-            (true, 2) => [(0, true), (1, false)],
-            (true, _) => [(1, true), (0, true)],
+        // north = cos x + sin y, east = sin x - cos y; an oblique Mercator's azimuth is between -90 and 90 degrees, so
+        // that a show that looks to the south is seen from its other side.
+        let (of, azimuth_deg) = match (is_aligned, quarters.round().rem_euclid(4.0) as u8) {
+            (true, 0) => ([(0, false), (1, true)], None),
+            (true, 1) => ([(1, false), (0, false)], None),
+            (true, 2) => ([(0, true), (1, false)], None),
+            (true, _) => ([(1, true), (0, true)], None),
+            (false, _) if turned_deg < 90.0 => ([(0, false), (1, true)], Some(turned_deg)),
+            (false, _) if turned_deg > 270.0 => ([(0, false), (1, true)], Some(turned_deg - 360.0)),
+            (false, _) => ([(0, true), (1, false)], Some(turned_deg - 180.0)),
         };
         let both = [grid.x_m.clone(), grid.y_m.clone()];
         let axis = |(which, backwards): (usize, bool)| -> Vec<f64> {
@@ -118,7 +120,7 @@ impl Layout {
             let own = if which == 0 { x_m } else { y_m };
             if backwards { own.iter().rev().map(|m| 0.0 - m).collect() } else { own.clone() }
         };
-        Self { frame, axes: of.map(axis), of, is_aligned, grid: both }
+        Self { axes: of.map(axis), of, azimuth_deg, grid: both }
     }
 
     /// Column (x) and row (y) of the grid for each row and column of the file.
@@ -186,25 +188,20 @@ fn axes(
         ("axis", text("Z")),
     ];
     file.variable("z", &[z], &height, (&[grid.height_m], None))?;
-    let along =
-        |standard: &str, projected: &str, shown: &str, axis: &str| -> Vec<Attribute<'static>> {
-            if layout.is_aligned {
-                vec![
-                    ("standard_name", text(standard)),
-                    ("long_name", text(projected)),
-                    ("units", text("m")),
-                    ("axis", text(axis)),
-                ]
-            } else {
-                vec![("long_name", text(shown)), ("units", text("m"))]
-            }
-        };
-    let [north, east] = ["metres north of the origin", "metres east of the origin"];
-    let y_is = along("projection_y_coordinate", north, "to the left in the show frame", "Y");
-    let x_is =
-        along("projection_x_coordinate", east, "forward in the show frame, along the rows", "X");
-    file.variable("y", &[y], &y_is, (y_m, None))?;
-    file.variable("x", &[x], &x_is, (x_m, None))?;
+    let along = |name: &str, long_name: &str, axis: &str| {
+        [
+            ("standard_name", text(format!("projection_{name}_coordinate"))),
+            ("long_name", text(long_name)),
+            ("units", text("m")),
+            ("axis", text(axis)),
+        ]
+    };
+    let [north, east] = match layout.azimuth_deg {
+        None => ["metres north of the origin", "metres east of the origin"],
+        Some(_) => ["metres from the origin along the azimuth of crs", "metres to the right of it"],
+    };
+    file.variable("y", &[y], &along("y", north, "Y"), (y_m, None))?;
+    file.variable("x", &[x], &along("x", east, "X"), (x_m, None))?;
     let shown = beside("show time: since the start of the flight's show", "s");
     file.variable("show_time", &[time], &shown, (&grid.time_s, None))?;
     Ok(dims)
@@ -231,24 +228,6 @@ fn place(
         ];
         file.variable(name, &ground, &attributes, (&values, None))?;
     }
-    if !layout.is_aligned {
-        let places: Vec<Vector3<f64>> = layout
-            .shown_m()
-            .map(|[x_m, y_m]| layout.frame.to_neu(Vector3::new(x_m, y_m, 0.0)))
-            .collect();
-        for (name, standard, axis) in
-            [("northing", "projection_y_coordinate", 0), ("easting", "projection_x_coordinate", 1)]
-        {
-            let values: Vec<f64> = places.iter().map(|neu| neu[axis]).collect();
-            let long_name = format!("metres {} of the origin", ["north", "east"][axis]);
-            let attributes = [
-                ("standard_name", text(standard)),
-                ("long_name", text(long_name)),
-                ("units", text("m")),
-            ];
-            file.variable(name, &ground, &attributes, (&values, None))?;
-        }
-    }
     if let Some(amsl_m) = here.amsl_m(grid.height_m) {
         let attributes = [
             ("standard_name", text("altitude")),
@@ -261,23 +240,34 @@ fn place(
         ];
         file.variable("alt", &[*z], &attributes, (&[amsl_m], None))?;
     }
-    let numbers = [
-        ("latitude_of_projection_origin", frame.origin.lat_deg),
-        ("longitude_of_central_meridian", frame.origin.lon_deg),
-        ("scale_factor_at_central_meridian", 1.0),
+    let (name, long_name) = match layout.azimuth_deg {
+        None => ("transverse_mercator", "transverse Mercator at the origin of the show"),
+        Some(_) => {
+            ("oblique_mercator", "oblique Mercator along the rows of the show, at its origin")
+        }
+    };
+    let mut attributes = vec![("grid_mapping_name", text(name)), ("long_name", text(long_name))];
+    let [lat_deg, lon_deg] = [frame.origin.lat_deg, frame.origin.lon_deg];
+    let mut numbers = vec![
+        ("latitude_of_projection_origin", lat_deg),
         ("false_easting", 0.0),
         ("false_northing", 0.0),
         ("semi_major_axis", WGS84_A_M),
         ("inverse_flattening", INVERSE_FLATTENING),
     ];
-    let mut attributes = vec![
-        ("grid_mapping_name", text("transverse_mercator")),
-        (
-            "long_name",
-            text("transverse Mercator at the origin of the show: local metres east and north"),
-        ),
-    ];
-    attributes.extend(numbers.map(|(name, value)| (name, NcAttrValue::Doubles(vec![value]))));
+    match layout.azimuth_deg {
+        None => numbers.extend([
+            ("longitude_of_central_meridian", lon_deg),
+            ("scale_factor_at_central_meridian", 1.0),
+        ]),
+        Some(azimuth_deg) => numbers.extend([
+            ("azimuth_of_central_line", azimuth_deg),
+            ("longitude_of_projection_origin", lon_deg),
+            ("scale_factor_at_projection_origin", 1.0),
+        ]),
+    }
+    attributes
+        .extend(numbers.into_iter().map(|(name, value)| (name, NcAttrValue::Doubles(vec![value]))));
     file.variable("crs", &[], &attributes, (&[0_i32], None))
 }
 
@@ -288,10 +278,7 @@ fn values(
     dims: &[Dimension; 4],
     has_amsl: bool,
 ) -> Result<(), NetcdfError> {
-    let mut coordinates = "lat lon".to_owned();
-    for (more, has) in [(" easting northing", !layout.is_aligned), (" alt", has_amsl)] {
-        coordinates.push_str(if has { more } else { "" });
-    }
+    let coordinates = if has_amsl { "lat lon alt" } else { "lat lon" };
     let fields = [
         (
             "w",
@@ -319,7 +306,7 @@ fn values(
             ("long_name", text(long_name)),
             ("units", text("m s-1")),
             ("grid_mapping", text("crs")),
-            ("coordinates", text(coordinates.as_str())),
+            ("coordinates", text(coordinates)),
             ("coverage_content_type", text(content(name))),
         ];
         if name == "w" {
