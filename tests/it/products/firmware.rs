@@ -95,7 +95,8 @@ fn the_documents_python_runs() {
     analysed(&bench);
     fs::rename(bench.path("out"), bench.path("my-campaign")).unwrap();
     for document in ["docs/products.md", "docs/fields.md"] {
-        let text = fs::read_to_string(format!("{}/{document}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        let text =
+            fs::read_to_string(format!("{}/{document}", env!("CARGO_MANIFEST_DIR"))).unwrap();
         let blocks: Vec<&str> = text
             .split("```python\n")
             .skip(1)

@@ -61,7 +61,10 @@ fn geojson_has_a_point_and_a_way_for_each_drone() {
     let drone = &analysis.flights[1].map.as_ref().unwrap().drones[0];
     assert!((first["w_mps"].as_f64().unwrap() - drone.mean.value).abs() < 1e-4);
     assert!((first["w_se_mps"].as_f64().unwrap() - drone.mean.se).abs() < 1e-4);
-    assert_eq!(points[0]["geometry"]["coordinates"], serde_json::json!([19.062_198_3, 47.473_051_2, 289.5]));
+    assert_eq!(
+        points[0]["geometry"]["coordinates"],
+        serde_json::json!([19.062_198_3, 47.473_051_2, 289.5])
+    );
     assert_eq!(first["u_mps"], 3.25);
     assert_eq!(first["utc_start"], "2026-06-01T12:01:35.000Z");
     assert_eq!(first["drone"], "Drone <1> & \"co\"\u{fffd}", "text of others is plain");
@@ -87,7 +90,7 @@ fn kml_is_well_formed_and_has_all_drones_at_their_heights() {
     }
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.kml"), &text).unwrap();
-    let script = r#"
+    let script = r##"
 import xml.dom.minidom, json
 root = xml.dom.minidom.parse("a.kml").documentElement
 assert (root.tagName, root.namespaceURI) == ("kml", "http://www.opengis.net/kml/2.2")
@@ -103,7 +106,7 @@ for mark in root.getElementsByTagName("Placemark"):
     points += len(mark.getElementsByTagName("Point"))
     lines += len(mark.getElementsByTagName("LineString"))
 print(points, lines)
-"#;
+"##;
     let counts = python(folder.path(), script);
     let drones = analysis.flights[1].map.as_ref().unwrap().drones.len();
     assert!(counts.starts_with(&format!("{drones} ")), "{counts}");

@@ -60,8 +60,10 @@ fn what_has_neither_time_nor_place_is_no_file_and_that_is_said() {
     assert_eq!((made.drones, made.grids.len()), (None, 0));
     assert_eq!(
         made.left_out,
-        ["The values have no UTC (no GPS time in the log): there is no NetCDF file of the drones; the tables in fields/ \
-          have all of them"]
+        [
+            "The values have no UTC (no GPS time in the log): there is no NetCDF file of the drones; the tables in fields/ \
+          have all of them"
+        ]
     );
     assert_eq!(expected(&campaign()), (false, Vec::new()));
     let mut nowhere = placed();
@@ -105,16 +107,21 @@ fn the_compliance_checker_finds_nothing() {
     low.flights[1].site.as_mut().unwrap().ground_amsl_m = None;
     low.flights[1].map.as_mut().unwrap().drones[0].place = None;
     let folder = tempfile::tempdir().unwrap();
-    let cases = [("placed", placed()), ("north", turned(0.0)), ("west", turned(-90.0)), ("low", low)];
+    let cases =
+        [("placed", placed()), ("north", turned(0.0)), ("west", turned(-90.0)), ("low", low)];
     for (name, analysis) in cases {
         let folder = folder.path().join(name);
         fs::create_dir(&folder).unwrap();
         write(&analysis, &folder, Format::Netcdf4);
-        let said = python(&folder, &format!("{READ}\ncomplies('updraft.nc')\ncomplies('updraft-grid.nc')"));
+        let said = python(
+            &folder,
+            &format!("{READ}\ncomplies('updraft.nc')\ncomplies('updraft-grid.nc')"),
+        );
         assert_eq!(said.matches("All tests passed!").count(), 2, "{name}: {said}");
     }
     // The checker must be able to fail.
-    let damaged = "import netCDF4\nwith netCDF4.Dataset('updraft.nc', 'a') as file: file['w'].units = 'ohm'";
+    let damaged =
+        "import netCDF4\nwith netCDF4.Dataset('updraft.nc', 'a') as file: file['w'].units = 'ohm'";
     let folder = folder.path().join("placed");
     python(&folder, damaged);
     let said = python(&folder, &format!("{READ}\ncomplies('updraft.nc')"));
@@ -131,6 +138,25 @@ fn the_grids_projection_leads_to_the_places_of_its_cells() {
         write(&turned(orientation_deg), folder.path(), Format::Netcdf4);
         let said = python(folder.path(), &format!("{READ}\ngrid()\nprojection({orientation_deg})"));
         assert!(said.contains("projected 4"), "{orientation_deg}: {said}");
+    }
+}
+
+#[test]
+fn the_documents_python_reads_grids() {
+    if !can_run("xarray, netCDF4") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let fields = folder.path().join("my-campaign/fields");
+    fs::create_dir_all(&fields).unwrap();
+    write(&placed(), &fields, Format::Netcdf4);
+    let text =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/products.md")).unwrap();
+    let blocks = text.split("```python\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let blocks: Vec<&str> = blocks.filter(|block| block.contains("updraft-grid")).collect();
+    assert!(!blocks.is_empty());
+    for block in blocks {
+        python(folder.path(), block);
     }
 }
 
