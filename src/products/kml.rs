@@ -30,7 +30,7 @@ fn altitude_mode(place: &Place) -> &'static str {
 /// The colour's number of a speed on a scale to `end_mps`.
 fn class(w_mps: f64, end_mps: f64) -> usize {
     let classes = COLOURS.len() as f64;
-    let place = (w_mps / end_mps + 1.0) / 2.0 * classes;
+    let place = f64::midpoint(w_mps / end_mps, 1.0) * classes;
     place.floor().clamp(0.0, classes - 1.0) as usize
 }
 

@@ -62,13 +62,11 @@ fn origin(provenance: &Provenance, wish: &Files) -> Origin {
 
 /// Writes a text, or removes that of an earlier analysis.
 fn text(path: &Path, text: Option<String>) -> Result<(), WorkflowError> {
-    match text {
-        Some(text) => Ok(write_with(path, |out| out.write_all(text.as_bytes()))?),
-        None => {
-            remove(&[path.to_owned()]);
-            Ok(())
-        }
-    }
+    let Some(text) = text else {
+        remove(&[path.to_owned()]);
+        return Ok(());
+    };
+    Ok(write_with(path, |out| out.write_all(text.as_bytes()))?)
 }
 
 #[cfg(feature = "netcdf")]

@@ -65,7 +65,7 @@ fn a_posterior_adds_columns_and_rows_for_lost_drones() {
     assert_eq!(more.len(), map.time_s.len(), "one row for each second of the lost drone");
     assert_eq!(
         more[0],
-        "hover,95,48,slot 48,21.00,14.00,100.00,,,,,filled,,0.2500,0.1000,,47.4735266,19.0620781,100.00,\
+        "hover,95,48,slot 48,21.00,14.00,100.00,,,,,filled,,0.2500,0.1000,,47.4735265,19.0620785,100.00,\
          290.00,plan,,,,,"
     );
     let first = text.lines().nth(1).unwrap();
@@ -152,9 +152,9 @@ fn parquet_holds_what_the_csv_holds() {
             Field::Null => None,
             other => panic!("{other} is no number"),
         };
-        assert_eq!(read[0], Field::Str(row.flight));
+        assert_eq!(read[0], Field::Str(row.flight.clone()));
         assert_eq!(number(&read[1]), Some(row.time_s));
-        assert_eq!(read[3], Field::Str(row.drone));
+        assert_eq!(read[3], Field::Str(row.drone.clone()));
         assert_eq!(number(&read[7]), row.w_mps, "all digits");
         assert_eq!(number(&read[12]), row.truth_mps);
         assert_eq!(read[15], row.utc_ms.map_or(Field::Null, Field::TimestampMillis));

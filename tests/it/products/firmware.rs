@@ -50,6 +50,7 @@ fn a_log_of_the_firmware_tells_where_and_when_it_was() {
         assert!(bench.path(&format!("out/fields/{file}")).is_file(), "{file}");
     }
     let page = fs::read_to_string(bench.path("out/report/index.html")).unwrap();
+    let page = page.replace("&#x2f;", "/");
     for link in ["../fields/updraft.nc", "../fields/updraft.kml", "../fields/updraft.geojson"] {
         assert!(page.contains(link), "{link}");
     }

@@ -30,8 +30,8 @@ def drones():
     near(file.alt, table.altitude_amsl_m, 0.0051)
     near(file.show_time, table.time_s, 1e-9)
     bits = dict(zip(file.w_flag.flag_meanings.split(), file.w_flag.flag_masks))
-    wanted = [sum(bits[flag] for flag in flags.split(";")) for flags in table.flags.fillna("gap").replace("", "gap")]
-    empty = table.flags.isna() | (table.flags == "")
+    wanted = [sum(bits[flag] for flag in flags.split(";")) for flags in table["flags"].fillna("gap").replace("", "gap")]
+    empty = table["flags"].isna() | (table["flags"] == "")
     assert (file.w_flag.values == np.where(empty, 0, wanted)).all()
     assert set(np.unique(file.w_flag)) >= {0, bits["drift"], bits["drift"] | bits["no_voltage"], bits["filled"]}
 
