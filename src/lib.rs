@@ -29,6 +29,7 @@
 //! * [`gap`]: which physics a simulation lacks, by measured logs.
 //! * [`blind`]: flights with hidden physics that test it.
 //! * [`compare`]: campaigns side by side, with tests of what differs.
+//! * [`products`]: the measured fields for other programs: tables, NetCDF, maps.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`archive`]: many campaigns as one Parquet dataset.
 //! * [`live`]: a flight as it happens, or as it was, in a browser.
@@ -60,6 +61,7 @@ pub use skybrush_show::check;
 pub mod live;
 pub mod mission;
 pub mod numeric;
+pub mod products;
 pub mod report;
 pub mod skybrush_server;
 pub mod study;

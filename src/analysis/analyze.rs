@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::account::{self, Account};
 use super::aware::{ASKED_FOR, Aware, TYPICAL_SLOPE};
+use super::beside::Beside;
 use super::calibrate::{self, FitOptions};
 use super::cause::Cause;
 use super::caution::{fit_cautions, tilt_caution, wind_caution};
@@ -35,7 +36,6 @@ use super::site::FlightSite;
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
 use super::statistics::result::FieldStatistics;
-use super::statistics::tilt_wind::LeanDrag;
 use super::table::{self, PaperTable, TableLaw};
 use super::track;
 use super::truth;
@@ -345,6 +345,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
     }
     let (mut map, modelled) = (!measured.is_empty()).then(|| map(measured, shared)).unzip();
     warnings.extend(map.iter().flat_map(|map| map_warnings(shared, map)));
+    if let Some(map) = &mut map {
+        Beside::add(map, seen.iter().map(|seen| &seen.beside));
+    }
     let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
     if let Some((map, modelled)) = map.as_mut().zip(modelled) {
         posterior::add(
@@ -541,14 +544,9 @@ fn statistics(
     seen: &[HoverSeen],
 ) -> Option<FieldStatistics> {
     let Shared { input, options, .. } = shared;
-    let drag = match (input.leaning, shared.corrections.lean_table) {
-        (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
-        (None, Some(table)) => LeanDrag::Table(table),
-        (None, None) => LeanDrag::Unknown,
-    };
     (!map.is_scan()).then(|| FieldStatistics {
         true_air: input.true_air.cloned(),
-        ..of_map(map, seen, &options.statistics, drag)
+        ..of_map(map, seen, &options.statistics, shared.drag())
     })
 }
 
@@ -665,6 +663,8 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
             posterior_mps: Vec::new(),
             posterior_sd_mps: Vec::new(),
             posterior_mean: None,
+            place: None,
+            wind: None,
         })
         .collect();
     let modelled = series

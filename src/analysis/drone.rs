@@ -1,6 +1,7 @@
 //! Analysis of one log of a flight: windows, laws and (with reference laws) the air.
 
 use super::aware::Aware;
+use super::beside::Beside;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
 use super::corrections::Corrections;
@@ -14,6 +15,7 @@ use super::options::AnalysisOptions;
 use super::reference::laws_for;
 use super::result::{DroneAnalysis, FlightAnalysis, Laws, Trace, WindowStats};
 use super::running::{RUNNING_S, Running};
+use super::statistics::tilt_wind::LeanDrag;
 use super::stats::mean_sd;
 use super::steps::steady;
 use super::track;
@@ -37,6 +39,17 @@ pub(super) struct Shared<'a> {
     pub(super) corrections: Corrections<'a>,
     /// The calibration with what it tells about errors, for the map.
     pub(super) aware: Option<Aware<'a>>,
+}
+
+impl<'a> Shared<'a> {
+    /// What makes the drones lean in wind.
+    pub(super) fn drag(&self) -> LeanDrag<'a> {
+        match (self.input.leaning, self.corrections.lean_table) {
+            (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
+            (None, Some(table)) => LeanDrag::Table(table),
+            (None, None) => LeanDrag::Unknown,
+        }
+    }
 }
 
 /// What one log gave.
@@ -140,7 +153,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         warnings,
     };
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
-    let hover = HoverSeen::of(flight, &corrected, &of_air);
+    let beside = match &updraft {
+        Some(Ok((series, _))) => Beside::of(flight, series, shared.drag()),
+        _ => Beside::default(),
+    };
+    let mut hover = HoverSeen::of(flight, &corrected, &of_air);
+    hover.beside = beside;
     let truth = true_air(flight, &of_air);
     let first_fix_deg = flight.first_fix_deg;
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, first_fix_deg, truth })

@@ -1,5 +1,6 @@
 //! The statistics of a flight's map: what its logs showed, as the input of the pure functions.
 
+use super::beside::Beside;
 use super::result::{Fit, Laws, UpdraftMap};
 use super::running::RUNNING_S;
 use super::statistics::averaging::{Seconds, averaging};
@@ -26,6 +27,8 @@ pub(super) struct HoverSeen {
     forward_right: [f64; 2],
     /// Mean heading, degrees clockwise from north.
     heading_deg: Option<f64>,
+    /// What its log tells beside the vertical air speed.
+    pub(super) beside: Beside,
 }
 
 impl HoverSeen {
@@ -47,6 +50,7 @@ impl HoverSeen {
             seconds,
             forward_right: forward_right(flight, hover),
             heading_deg: heading_deg(flight, hover),
+            beside: Beside::default(),
         }
     }
 }
@@ -56,7 +60,7 @@ fn forward_right(flight: &Flight, hover: &Target) -> [f64; 2] {
     let over =
         |series: &Series| mean(series.between(hover.start_s, hover.end_s)).unwrap_or_default();
     let (roll, pitch) = (over(&flight.roll_rad), over(&flight.pitch_rad));
-    [-pitch.tan(), roll.tan() / pitch.cos()]
+    MeanLean::forward_right_of(roll, pitch)
 }
 
 /// Mean heading, which jumps at north; `None` without headings.

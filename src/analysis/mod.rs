@@ -10,6 +10,7 @@ mod analyze;
 mod analyze_tests;
 mod aware;
 pub mod battery;
+mod beside;
 pub mod budget;
 pub mod calibrate;
 mod cause;

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::beside::{DronePlace, DroneWindSeries};
 pub use super::budget::{
     BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, Supply,
     TruthCheck,
@@ -501,4 +502,10 @@ pub struct DroneUpdraft {
     pub quality: Vec<QualityFlag>,
     /// True value at the same times, when it is known.
     pub truth_mps: Option<Vec<f64>>,
+    /// Where it was on the globe; absent: its log does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<DronePlace>,
+    /// Horizontal wind on it; absent: the drag of the vehicle or the heading is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wind: Option<DroneWindSeries>,
 }

@@ -115,6 +115,8 @@ mod tests {
             posterior_mean: None,
             quality: Vec::new(),
             truth_mps,
+            place: None,
+            wind: None,
         }
     }
 

@@ -19,6 +19,14 @@ pub fn sha256_of_files<'a>(hashes: impl IntoIterator<Item = &'a str>) -> String 
     sha256(hashes.join("\n").as_bytes())
 }
 
+/// SHA-256 of the lines `HASH  PATH` of files (path, hash) by path, as `sha256sum` writes them.
+pub fn sha256_of_list<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
+    let mut files: Vec<(&str, &str)> = files.into_iter().collect();
+    files.sort_unstable();
+    let lines: Vec<String> = files.iter().map(|(path, hash)| format!("{hash}  {path}\n")).collect();
+    sha256(lines.concat().as_bytes())
+}
+
 #[cfg(test)]
 mod tests {
     #[test]
@@ -28,5 +36,11 @@ mod tests {
             super::sha256(b"abc"),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
         );
+    }
+
+    #[test]
+    fn the_hash_of_a_list_is_that_of_sha256sums() {
+        let files = [("b/2.BIN", "22"), ("a/1.BIN", "11")];
+        assert_eq!(super::sha256_of_list(files), super::sha256(b"11  a/1.BIN\n22  b/2.BIN\n"));
     }
 }

@@ -7,6 +7,7 @@ pub mod digest;
 pub mod estimate;
 pub mod json;
 pub mod layout;
+pub mod markup;
 pub mod own_folder;
 pub(crate) mod said;
 pub mod sentence;

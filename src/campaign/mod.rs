@@ -362,6 +362,52 @@ pub fn fields_grid_parquet(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft-grid.parquet")
 }
 
+/// Path of the drones' values as NetCDF, in the folder of an analysis.
+pub fn fields_netcdf(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft.nc")
+}
+
+/// Path of the posterior map between the drones as NetCDF, in the folder of an analysis; of one flight where several
+/// have one.
+pub fn fields_grid_netcdf(folder: &Path, flight: Option<&str>) -> PathBuf {
+    let name = match flight {
+        Some(flight) => format!("{GRID_STEM}-{}.nc", file_part(flight)),
+        None => format!("{GRID_STEM}.nc"),
+    };
+    folder.join("fields").join(name)
+}
+
+/// Path of the drones on a map as GeoJSON, in the folder of an analysis.
+pub fn fields_geojson(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft.geojson")
+}
+
+/// Path of the drones on a map as KML, in the folder of an analysis.
+pub fn fields_kml(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft.kml")
+}
+
+/// Begin of the names of grids.
+const GRID_STEM: &str = "updraft-grid";
+
+/// A name as a part of a file's name: letters, digits, points and hyphens.
+fn file_part(name: &str) -> String {
+    let kept = |c: char| if c.is_alphanumeric() || c == '.' || c == '-' { c } else { '-' };
+    name.chars().map(kept).collect()
+}
+
+/// Grids as NetCDF that are there, in the folder of an analysis, by name.
+pub fn fields_grids_netcdf(folder: &Path) -> Vec<PathBuf> {
+    let is_grid = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(GRID_STEM) && name.ends_with(".nc")
+    };
+    let there = std::fs::read_dir(folder.join("fields")).into_iter().flatten().flatten();
+    let mut grids: Vec<PathBuf> = there.map(|entry| entry.path()).filter(is_grid).collect();
+    grids.sort();
+    grids
+}
+
 /// Path of the simulation study that belongs to a campaign.
 pub fn study_folder(folder: &Path) -> PathBuf {
     folder.join("study")

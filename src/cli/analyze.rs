@@ -10,6 +10,7 @@ use super::analyze_each;
 use super::basemap_args::BasemapArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::files_args::FilesArgs;
 use super::origin::OriginChoice;
 use super::paper_args::PaperArgs;
 use super::shard_args::ShardArgs;
@@ -24,7 +25,7 @@ use crate::flight::Indicator;
 use crate::report::{Basemap, NO_EDGE, terminal_summary};
 use crate::workflow::analyze::each::record_path;
 use crate::workflow::analyze::{
-    Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
+    Analysed, Analysing, Files, Request, Settings, Uncorrected as Without, gather, simulated,
 };
 use crate::workflow::basemap::shows_work;
 use crate::workflow::clock::Stopwatch;
@@ -94,6 +95,8 @@ pub(super) struct AnalyzeArgs {
     paper: PaperArgs,
     #[command(flatten)]
     sharing: ShardArgs,
+    #[command(flatten)]
+    files: FilesArgs,
     #[command(flatten)]
     options: AnalyzeOptions,
 }
@@ -236,7 +239,8 @@ impl AnalyzeOptions {
         options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
-        Settings { options, without, combine: self.indicator == IndicatorChoice::All }
+        let combine = self.indicator == IndicatorChoice::All;
+        Settings { options, without, combine, files: Files::default() }
     }
 }
 
@@ -269,7 +273,7 @@ impl AnalyzeArgs {
 
     /// What all of them have in common: settings, held laws, share.
     pub(super) fn common(&self) -> (Settings, Option<&Path>, Share) {
-        (self.options.settings(), self.hold.as_deref(), self.sharing.share())
+        (self.files.of(self.options.settings()), self.hold.as_deref(), self.sharing.share())
     }
 
     /// The response and the level that tables are inverted with, if that was asked for.
@@ -323,20 +327,21 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         None => Some(request.output()?),
     };
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
+    let settings = args.files.of(options.settings());
     let wanted = Wanted { output: output.as_deref(), basemap, paper };
-    finish(context, &work, &options, args.hold.as_deref(), wanted)
+    finish(context, &work, &settings, args.hold.as_deref(), wanted)
 }
 
 /// Analyses a campaign into its own folder; the last step of `updraft run`.
 pub(super) fn analyze_campaign(
     context: &Context,
     root: &Path,
-    options: &AnalyzeOptions,
+    settings: &Settings,
     (basemap, paper): (Option<Basemap>, Option<PaperFigures>),
 ) -> Result<Exit, CommandError> {
     // What was just flown here.
     let wanted = Wanted { output: Some(root), basemap, paper };
-    finish(context, &simulated(root)?, options, None, wanted)
+    finish(context, &simulated(root)?, settings, None, wanted)
 }
 
 /// What is made of an analysis beside what is printed.
@@ -351,13 +356,12 @@ struct Wanted<'a> {
 fn finish(
     context: &Context,
     work: &Work,
-    options: &AnalyzeOptions,
+    settings: &Settings,
     hold: Option<&Path>,
     Wanted { output, basemap, paper }: Wanted<'_>,
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
-    let settings = options.settings();
-    let analysing = Analysing::begin(context, work, &settings, hold)?;
+    let analysing = Analysing::begin(context, work, settings, hold)?;
     // Tables and quiet runs say it with the other warnings.
     if let Some(doubts) = analysing.doubts().filter(|_| context.json && !context.quiet) {
         context.warn(doubts);

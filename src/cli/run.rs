@@ -9,6 +9,7 @@ use super::basemap_args::BasemapArgs;
 use super::check::few;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::files_args::FilesArgs;
 use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
 use super::paper_args::PaperArgs;
@@ -82,6 +83,8 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     paper: PaperArgs,
     #[command(flatten)]
+    files: FilesArgs,
+    #[command(flatten)]
     hide: HideArgs,
     #[command(flatten)]
     air: AirArgs,
@@ -112,8 +115,8 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     if flown.ending == Ending::NoGo {
         return Ok(Exit::Unsafe);
     }
-    let options = AnalyzeOptions::of_run(args.estimate.plain);
-    let exit = analyze_campaign(context, &args.output, &options, (basemap, paper))?;
+    let settings = args.files.of(AnalyzeOptions::of_run(args.estimate.plain).settings());
+    let exit = analyze_campaign(context, &args.output, &settings, (basemap, paper))?;
     context.say(&format!("Done in {watch}"));
     Ok(if flown.ending == Ending::Losses { Exit::Losses } else { exit })
 }

@@ -64,6 +64,7 @@ const WANTED: &[Select<'static>] = &[
         message: "GPS",
         fields: &["TimeUS", "I", "Status", "GMS", "GWk", "Lat", "Lng", "Alt"],
     },
+    Select { message: "POS", fields: &["TimeUS", "TimeMS", "Lat", "Lng", "Alt"] },
     Select { message: "ARM", fields: &["TimeUS", "ArmState"] },
     Select { message: "EV", fields: &["TimeUS", "TimeMS", "Id"] },
     Select { message: "PARM", fields: &["TimeUS", "Name", "Value"] },
@@ -134,7 +135,10 @@ impl Messages {
             }
             let message = table.message.clone();
             let (rows, dropped) = Rows::from_table(table);
-            messages.dropped += dropped;
+            // What is lost of the place alone is no doubt about the measurement.
+            if message != "POS" {
+                messages.dropped += dropped;
+            }
             if !rows.is_empty() {
                 messages.rows.insert(message, rows);
             }
@@ -444,11 +448,38 @@ impl Messages {
     /// Latitude and longitude of GPS rows with a 3-D fix: (board time s, degrees, degrees).
     pub(super) fn places(&self) -> Vec<(f64, f64, f64)> {
         let mut places = self.fixes("Lat", "Lng");
-        // Damaged rows, and receivers that claim a fix at 0, 0 before they have one.
-        places.retain(|(_, lat, lon)| {
-            lat.abs() <= 90.0 && lon.abs() <= 180.0 && (*lat != 0.0 || *lon != 0.0)
-        });
+        places.retain(|(_, lat, lon)| is_place(*lat, *lon));
         places
+    }
+
+    /// The same with the height above sea level, m (NaN: not logged).
+    pub(super) fn receiver_places(&self) -> Vec<(f64, [f64; 3])> {
+        let heights = self.fixes("Lat", "Alt");
+        let mut heights = heights.iter().peekable();
+        let height_m = |time_s: f64| {
+            while heights.next_if(|height| height.0 < time_s).is_some() {}
+            heights.peek().filter(|height| height.0 == time_s).map_or(f64::NAN, |height| height.2)
+        };
+        let places = self.places().into_iter();
+        let mut height_m = height_m;
+        places.map(|(time_s, lat, lon)| (time_s, [lat, lon, height_m(time_s)])).collect()
+    }
+
+    /// Latitude, longitude, degrees, and height above sea level, m, of the position filter.
+    pub(super) fn filter_places(&self) -> Vec<(f64, [f64; 3])> {
+        let Some(rows) = self.rows("POS") else { return Vec::new() };
+        let [Some(lat), Some(lon), alt] = ["Lat", "Lng", "Alt"].map(|name| rows.column(name))
+        else {
+            return Vec::new();
+        };
+        let height_m = |row: usize| alt.and_then(|alt| alt.get(row)).copied().unwrap_or(f64::NAN);
+        (0..rows.time_s.len())
+            .filter_map(|row| {
+                let place = [*lat.get(row)?, *lon.get(row)?, height_m(row)];
+                Some((*rows.time_s.get(row)?, place))
+            })
+            .filter(|(_, [lat, lon, _])| is_place(*lat, *lon))
+            .collect()
     }
 
     fn fixes(&self, first: &str, second: &str) -> Vec<(f64, f64, f64)> {
@@ -465,6 +496,11 @@ impl Messages {
             .filter(|(_, one, two)| one.is_finite() && two.is_finite())
             .collect()
     }
+}
+
+/// Whether this is a place: neither damage, nor what receivers claim (0, 0) before they have a fix.
+fn is_place(lat_deg: f64, lon_deg: f64) -> bool {
+    lat_deg.abs() <= 90.0 && lon_deg.abs() <= 180.0 && (lat_deg != 0.0 || lon_deg != 0.0)
 }
 
 /// The value, or NaN (which channels leave out) when it is larger than anything possible.

@@ -5,7 +5,9 @@ use std::path::Path;
 use super::align::{Evidence, align};
 use super::channels::{Ekf, Messages};
 use super::supply::Logged;
-use super::{Effort, Flight, FlightError, FlightOptions, Indicator, Loss, Series, Warning, pick};
+use super::{
+    Effort, Flight, FlightError, FlightOptions, Indicator, Loss, Place, Series, Warning, pick,
+};
 use crate::log::Log;
 use crate::numeric::{most, upper_median};
 
@@ -126,6 +128,7 @@ pub(super) fn load(
         armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
         pulse_limits_us,
         cut_off_at_m,
+        place: Place::of(&messages).map(|place| place.map(cut)),
         first_fix_deg: place.map(|(_, latitude, longitude)| (latitude, longitude)),
         scan: messages.scan,
         clock,

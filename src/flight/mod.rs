@@ -13,6 +13,7 @@
 //! | desired vertical velocity | GUIP, PSCD, CTUN |
 //! | battery | BAT (with the voltage at rest), CURR |
 //! | show time and stage | SHOW |
+//! | place on the globe | POS, GPS |
 
 mod align;
 mod channels;
@@ -25,6 +26,7 @@ pub mod identity;
 mod indicator;
 mod load;
 mod pick;
+mod place;
 mod series;
 mod supply;
 pub mod table;
@@ -44,6 +46,7 @@ use crate::mission::plan::Segment;
 pub use fit::share_flown;
 pub use identity::{Belongs, Identity, identify};
 pub use indicator::{Effort, Indicator};
+pub use place::{Place, PlaceBy};
 pub use warning::{Loss, Warning};
 
 /// A channel: samples with their own times.
@@ -108,6 +111,8 @@ pub struct Flight {
     pub pulse_limits_us: (f64, f64),
     /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
     pub first_fix_deg: Option<(f64, f64)>,
+    /// Place on the globe over time; absent: the log has none.
+    pub place: Option<Place>,
     /// Height above home at which the vehicle was when the log ended with its motors running, m;
     /// `None` if the log goes on until the vehicle is on the ground.
     pub cut_off_at_m: Option<f64>,

@@ -6,7 +6,7 @@ use minijinja::context;
 use minijinja::value::Value;
 
 use crate::analysis::result::{Analysis, FlightAnalysis};
-use crate::base::digest::sha256;
+use crate::base::digest::sha256_of_list;
 
 use super::opening::{day_and_time, site_words, when};
 use super::page::capitalised;
@@ -39,6 +39,7 @@ pub(super) fn citation(analysis: &Analysis, title: &str, provenance: &Provenance
         Some(day_and_time(when.unix_s(when.span_s[0])?).0)
     });
     let logs: usize = analysis.flights.iter().map(|flight| flight.logs).sum();
+    let inputs = provenance.inputs.iter().map(|file| (file.path.as_str(), file.sha256.as_str()));
     context! {
         line => line(analysis, title, day.as_deref(), site.as_deref(), provenance),
         site,
@@ -47,7 +48,7 @@ pub(super) fn citation(analysis: &Analysis, title: &str, provenance: &Provenance
         flights,
         logs => count(logs, "log"),
         files => count(provenance.inputs.len(), "file"),
-        inputs_sha256 => (!provenance.inputs.is_empty()).then(|| list_sha256(&provenance.inputs)),
+        inputs_sha256 => (!provenance.inputs.is_empty()).then(|| sha256_of_list(inputs)),
         analysis_sha256 => provenance.analysis_sha256.as_deref().map(clean),
         listed,
     }
@@ -90,27 +91,5 @@ fn flight_line(flight: &FlightAnalysis) -> Value {
         name => capitalised(&clean(&flight.name)),
         time,
         drones => count(flight.drones.len(), "drone"),
-    }
-}
-
-/// SHA-256 of the lines `HASH  PATH` of all inputs by path, as `sha256sum` writes them.
-fn list_sha256(inputs: &[InputFile]) -> String {
-    let mut lines: Vec<(&str, &str)> =
-        inputs.iter().map(|input| (input.path.as_str(), input.sha256.as_str())).collect();
-    lines.sort_unstable();
-    let lines: Vec<String> = lines.iter().map(|(path, hash)| format!("{hash}  {path}\n")).collect();
-    sha256(lines.concat().as_bytes())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_hash_of_inputs_is_that_of_sha256sums_list() {
-        let input =
-            |path: &str, sha256: &str| InputFile { path: path.into(), sha256: sha256.into() };
-        let both = [input("b/2.BIN", "22"), input("a/1.BIN", "11")];
-        assert_eq!(list_sha256(&both), sha256(b"11  a/1.BIN\n22  b/2.BIN\n"));
     }
 }

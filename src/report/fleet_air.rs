@@ -137,6 +137,8 @@ mod tests {
                 posterior_mean: None,
                 quality: Vec::new(),
                 truth_mps: None,
+                place: None,
+                wind: None,
             })
             .collect();
         map

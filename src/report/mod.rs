@@ -22,10 +22,6 @@ mod delta;
 mod drone_table;
 mod errors;
 mod explorer;
-pub mod fields;
-pub mod fields_grid;
-#[cfg(feature = "parquet")]
-pub mod fields_parquet;
 mod figures;
 mod fill;
 mod film;

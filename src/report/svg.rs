@@ -2,25 +2,11 @@
 
 use std::fmt::Write as _;
 
+pub(super) use crate::base::markup::escape;
+
 use super::format::Format;
 use super::sheet::svg_head;
 use super::text::clean;
-
-/// Escapes text for XML and HTML, in text and in attributes.
-pub(super) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            other => out.push(other),
-        }
-    }
-    out
-}
 
 /// Where a text's position lies in it.
 #[derive(Clone, Copy, Debug)]

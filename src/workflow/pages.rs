@@ -6,7 +6,8 @@ use super::words::shell;
 use crate::analysis::result::Analysis;
 use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
-use crate::report::{PAGE_FILE, PageLink, fields, fields_grid};
+use crate::products::{self, fields, fields_grid};
+use crate::report::{PAGE_FILE, PageLink};
 
 /// Page of a report, of a comparison and of a study, from their folder.
 const PAGE: &str = "report";
@@ -27,6 +28,15 @@ pub(super) fn of_report(root: &Path, folder: &Path, analysis: &Analysis) -> Vec<
             "The posterior between the drones, as a table",
             relative(folder, &campaign::fields_grid_csv(folder)),
         ));
+    }
+    links.extend(netcdf(folder, analysis));
+    if products::has_map(analysis) {
+        for (title, path) in [
+            ("The drones on a map, for Google Earth (KML)", campaign::fields_kml(folder)),
+            ("The drones on a map, for a GIS (GeoJSON)", campaign::fields_geojson(folder)),
+        ] {
+            links.push(PageLink::there(title, relative(folder, &path)));
+        }
     }
     links.push(PageLink::there("The figures, one SVG each", "figures/"));
     if folder != root || !campaign::is_campaign(root) {
@@ -53,6 +63,31 @@ pub(super) fn of_report(root: &Path, folder: &Path, analysis: &Analysis) -> Vec<
         format!("updraft live {named}"),
     ));
     links
+}
+
+/// The NetCDF files.
+#[cfg(feature = "netcdf")]
+fn netcdf(folder: &Path, analysis: &Analysis) -> Vec<PageLink> {
+    let (drones, grids) = products::netcdf::expected(analysis);
+    let single = grids.len() == 1;
+    let drones = drones
+        .then(|| ("The drones, second by second".to_owned(), campaign::fields_netcdf(folder)));
+    let grids = grids.iter().map(|flight| {
+        let named = if single { String::new() } else { format!(", {flight}") };
+        let path = campaign::fields_grid_netcdf(folder, (!single).then_some(flight));
+        (format!("The posterior between the drones{named}"), path)
+    });
+    let files = drones.into_iter().chain(grids);
+    files
+        .map(|(title, path)| {
+            PageLink::there(&format!("{title}, as NetCDF (CF)"), relative(folder, &path))
+        })
+        .collect()
+}
+
+#[cfg(not(feature = "netcdf"))]
+fn netcdf(_: &Path, _: &Analysis) -> Vec<PageLink> {
+    Vec::new()
 }
 
 /// Manifests of a flight's logs.

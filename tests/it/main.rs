@@ -20,6 +20,7 @@ mod house;
 mod live;
 mod mission;
 mod ports;
+mod products;
 mod report;
 mod skybrush_server;
 mod statistics;

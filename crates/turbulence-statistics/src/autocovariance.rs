@@ -30,6 +30,11 @@ pub fn auto(record: &Record, lags: usize) -> Vec<f64> {
     cross(record, record, lags)
 }
 
+/// The first lag at which nothing is left of an autocovariance.
+pub fn first_lost(autocovariance: &[f64]) -> Option<usize> {
+    autocovariance.iter().position(|value| value.is_nan() || *value <= 0.0)
+}
+
 /// An exponential of the lag that fits an autocovariance: variance and integral time, corrected for the mean that was
 /// taken from the same record.
 ///
@@ -56,7 +61,7 @@ pub fn share_in_mean(time_s: f64, length_s: f64) -> f64 {
 impl Exponential {
     /// Fits lags from `from` on to the first at which nothing is left; `None` of what does not decay.
     pub fn fit(autocovariance: &[f64], step_s: f64, length_s: f64, from: usize) -> Option<Self> {
-        let end = autocovariance.iter().position(|value| !(*value > 0.0))?;
+        let end = first_lost(autocovariance)?;
         // Beyond the first zero it is what one realisation happens to be.
         let used = autocovariance.get(from..end.max(from + 3)).filter(|used| used.len() >= 3)?;
         let mut best: Option<(f64, Self)> = None;

@@ -1,7 +1,7 @@
 //! Variances, covariances and skewness of records, with random and systematic errors.
 
 use crate::Record;
-use crate::autocovariance::{Exponential, auto, cross, share_in_mean};
+use crate::autocovariance::{Exponential, auto, cross, first_lost, share_in_mean};
 use crate::quantile::{WIDTH, of_variance, scaled};
 
 /// Lags that enter errors reach to this share of a record.
@@ -46,9 +46,11 @@ fn of_air(record: &Record, noise: f64) -> Option<(Vec<f64>, Option<Exponential>)
     lags[0] -= noise;
     let fitted = Exponential::fit(&lags, record.step_s(), length_s(record), 1);
     let taken = fitted.map_or(0.0, |fitted| fitted.in_mean * fitted.variance);
-    let end = lags.iter().position(|value| !(*value > 0.0)).unwrap_or(lags.len());
+    let end = first_lost(&lags).unwrap_or(lags.len());
     lags.truncate(end.max(1));
-    lags.iter_mut().for_each(|value| *value += taken);
+    for value in &mut lags {
+        *value += taken;
+    }
     Some((lags, fitted))
 }
 
@@ -161,7 +163,7 @@ pub fn covariance(a: &Record, b: &Record, scale_se: f64) -> Option<Moment> {
     if value.is_nan() {
         return None;
     }
-    let end = |lags: &[f64]| lags.iter().position(|value| !(*value > 0.0)).unwrap_or(lags.len());
+    let end = |lags: &[f64]| first_lost(lags).unwrap_or(lags.len());
     let until = end(&of_a).min(end(&of_b)).max(1);
     let product = |lag: usize| of_a[lag] * of_b[lag] + later[lag] * earlier[lag];
     let random2 = of_mean(both as f64, until, product).max(0.0);

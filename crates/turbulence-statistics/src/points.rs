@@ -36,6 +36,9 @@ pub struct DistanceClass {
     pub by_lag: Vec<f64>,
 }
 
+/// Distance of a pair, its covariance, and that by lag.
+type Pair = (f64, Moment, Vec<f64>);
+
 /// Mean covariances in classes of distance that are `width_m` wide, with lags up to `lags` steps.
 pub fn by_distance(
     points: &[At<'_>],
@@ -43,7 +46,7 @@ pub fn by_distance(
     lags: usize,
     scale_se: f64,
 ) -> Vec<DistanceClass> {
-    let mut classes = std::collections::BTreeMap::<u64, Vec<(f64, Moment, Vec<f64>)>>::new();
+    let mut classes = std::collections::BTreeMap::<u64, Vec<Pair>>::new();
     for (i, one) in points.iter().enumerate() {
         for other in &points[i + 1..] {
             let [x, y] = [0, 1].map(|axis| other.place_m[axis] - one.place_m[axis]);
@@ -56,11 +59,9 @@ pub fn by_distance(
             classes.entry(class).or_default().push((distance_m, moment, both));
         }
     }
-    let class = |pairs: Vec<(f64, Moment, Vec<f64>)>| {
+    let class = |pairs: Vec<Pair>| {
         let count = pairs.len() as f64;
-        let mean = |of: &dyn Fn(&(f64, Moment, Vec<f64>)) -> f64| {
-            pairs.iter().map(of).sum::<f64>() / count
-        };
+        let mean = |of: &dyn Fn(&Pair) -> f64| pairs.iter().map(of).sum::<f64>() / count;
         let value = mean(&|(_, moment, _)| moment.value);
         let random = mean(&|(_, moment, _)| moment.random);
         let width = WIDTH * random.hypot(value * scale_se);
@@ -140,7 +141,7 @@ pub fn advection(points: &[At<'_>], longest_s: f64) -> Option<Advection> {
     }
     let fit = |without: Option<usize>| {
         let used = pairs.iter().filter(|(i, j, ..)| Some(*i) != without && Some(*j) != without);
-        slowness(used.map(|(_, _, apart, lag_s, correlation)| (*apart, *lag_s, *correlation)))
+        slowness(&used.map(|(_, _, apart, lag_s, correlation)| (*apart, *lag_s, *correlation)))
     };
     if pairs.len() < FEWEST_PAIRS {
         return None;
@@ -164,7 +165,7 @@ pub fn advection(points: &[At<'_>], longest_s: f64) -> Option<Advection> {
 }
 
 /// Velocity whose slowness explains lags over distances; outliers, as of pairs that are alike by chance, count less.
-fn slowness(pairs: impl Iterator<Item = ([f64; 2], f64, f64)> + Clone) -> Option<[f64; 2]> {
+fn slowness(pairs: &(impl Iterator<Item = ([f64; 2], f64, f64)> + Clone)) -> Option<[f64; 2]> {
     let mut slow = [0.0, 0.0];
     let mut scale_s = f64::INFINITY;
     for _ in 0..20 {
@@ -182,7 +183,7 @@ fn slowness(pairs: impl Iterator<Item = ([f64; 2], f64, f64)> + Clone) -> Option
             right = [right[0] + weight * x * lag_s, right[1] + weight * y * lag_s];
         }
         let determinant = normal[0] * normal[2] - normal[1] * normal[1];
-        if !(determinant > 1e-9 * normal[0] * normal[2]) {
+        if determinant.is_nan() || determinant <= 1e-9 * normal[0] * normal[2] {
             return None;
         }
         slow = [

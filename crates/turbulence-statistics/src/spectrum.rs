@@ -124,7 +124,9 @@ fn transformed(values: &[f64], step_s: f64, planner: &mut FftPlanner<f64>) -> Ve
     lines.truncate(values.len() / 2);
     // The window's mean square is 3/8; twice: the spectrum has one side.
     let scale = (2.0 * step_s / (0.375 * count)).sqrt();
-    lines.iter_mut().for_each(|line| *line *= scale);
+    for line in &mut lines {
+        *line *= scale;
+    }
     lines
 }
 

@@ -55,29 +55,30 @@ impl Air {
 
     /// A record of it at instants, a part of one that is sixteen times as long.
     fn draw(&self, seed: u64, noise: f64) -> Record {
-        self.with(seed, noise, &|frequency_hz| self.sampled(frequency_hz))
+        drawn(seed, noise, &|frequency_hz| self.sampled(frequency_hz))
     }
 
     /// A record of an instrument that passes only what its sampling can show.
     fn draw_limited(&self, seed: u64, noise: f64) -> Record {
-        self.with(seed, noise, &|frequency_hz| self.density(frequency_hz))
+        drawn(seed, noise, &|frequency_hz| self.density(frequency_hz))
     }
+}
 
-    fn with(&self, seed: u64, noise: f64, density: &dyn Fn(f64) -> f64) -> Record {
-        let mut random = Pcg64::seed_from_u64(seed);
-        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-        let count = 16 * COUNT;
-        let step_hz = 1.0 / (count as f64 * STEP_S);
-        let mut lines = vec![Complex64::default(); count];
-        for line in 1..count / 2 {
-            let amplitude = (density(line as f64 * step_hz) * step_hz).sqrt() / 2.0;
-            lines[line] = Complex64::new(draw(), draw()) * amplitude;
-            lines[count - line] = lines[line].conj();
-        }
-        FftPlanner::new().plan_fft_inverse(count).process(&mut lines);
-        let values: Vec<f64> = lines[..COUNT].iter().map(|line| line.re).collect();
-        Record::new(STEP_S, values.into_iter().map(|value| Some(value + noise * draw())))
+/// A record with this density and white noise.
+fn drawn(seed: u64, noise: f64, density: &dyn Fn(f64) -> f64) -> Record {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+    let count = 16 * COUNT;
+    let step_hz = 1.0 / (count as f64 * STEP_S);
+    let mut lines = vec![Complex64::default(); count];
+    for line in 1..count / 2 {
+        let amplitude = (density(line as f64 * step_hz) * step_hz).sqrt() / 2.0;
+        lines[line] = Complex64::new(draw(), draw()) * amplitude;
+        lines[count - line] = lines[line].conj();
     }
+    FftPlanner::new().plan_fft_inverse(count).process(&mut lines);
+    let values: Vec<f64> = lines[..COUNT].iter().map(|line| line.re).collect();
+    Record::new(STEP_S, values.into_iter().map(|value| Some(value + noise * draw())))
 }
 
 fn share(of: impl ExactSizeIterator<Item = bool>) -> f64 {

@@ -1,7 +1,7 @@
 //! Covariances between points and advection in a drawn field that the wind carries past a grid of drones.
 
 use rand::SeedableRng as _;
-use rand_distr::{Distribution as _, StandardNormal, Uniform};
+use rand_distr::{Distribution as _, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 use turbulence_statistics::points::{At, advection, by_distance};
 use turbulence_statistics::{Record, moments, spectrum};
@@ -19,8 +19,7 @@ struct Field {
 impl Field {
     fn draw(seed: u64, sd_mps: f64, length_m: f64, wind_mps: [f64; 2]) -> Self {
         let mut random = Pcg64::seed_from_u64(seed);
-        let unit = Uniform::new(0.0, 1.0).unwrap();
-        let mut draw = || -> f64 { unit.sample(&mut random) };
+        let mut draw = || -> f64 { StandardUniform.sample(&mut random) };
         let waves = (0..WAVES).map(|_| {
             // The plane's spectrum of an exponential is k (k² + 1/L²)^(-3/2): its distribution turned round.
             let left: f64 = 1.0 - draw();
@@ -68,8 +67,7 @@ fn covariances_between_points_are_those_of_the_field() {
     let mut off = Vec::new();
     let mut inside = (0, 0);
     let mut fleet_inside = 0;
-    const SEEDS: u64 = 60;
-    for seed in 0..SEEDS {
+    for seed in 0..60 {
         let fleet = fleet(seed, sd_mps, length_m, [3.0, 1.0]);
         for class in by_distance(&points(&fleet), 10.0, 4, 0.0) {
             // The mean of the classes' pairs.
@@ -86,7 +84,7 @@ fn covariances_between_points_are_those_of_the_field() {
     off.sort_by(f64::total_cmp);
     let median = off[off.len() / 2];
     let held = inside.0 as f64 / inside.1 as f64;
-    println!("median off {median}, inside {held}, fleet {fleet_inside} of {SEEDS}");
+    println!("median off {median}, inside {held}, fleet {fleet_inside} of 60");
     assert!(median < 0.05, "{median}");
     assert!(held > 0.9, "{held}");
     assert!(fleet_inside >= 52, "{fleet_inside}");
@@ -96,17 +94,16 @@ fn covariances_between_points_are_those_of_the_field() {
 fn the_wind_is_found_by_what_it_carries() {
     let mut off = Vec::new();
     let mut sum = [0.0, 0.0];
-    const SEEDS: u64 = 24;
-    for seed in 0..SEEDS {
-        let (sin, cos) = (std::f64::consts::TAU * seed as f64 / SEEDS as f64).sin_cos();
-        let fleet = fleet(seed, 0.5, 40.0, [3.0 * cos, 3.0 * sin]);
+    for seed in 0..24u32 {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(seed) / 24.0).sin_cos();
+        let fleet = fleet(u64::from(seed), 0.5, 40.0, [3.0 * cos, 3.0 * sin]);
         let found = advection(&points(&fleet), 60.0).unwrap();
         let [x, y] = found.velocity_mps;
         sum = [sum[0] + x * cos + y * sin, sum[1] + y * cos - x * sin];
         off.push((found.speed_mps() / 3.0 - 1.0).abs());
     }
     off.sort_by(f64::total_cmp);
-    let [along, across] = sum.map(|sum| sum / SEEDS as f64);
+    let [along, across] = sum.map(|sum| sum / 24.0);
     let within = off.iter().filter(|off| **off < 0.15).count();
     println!(
         "along {along}, across {across}, within 15 %: {within}, median {}",

@@ -7,12 +7,14 @@ use crate::base::estimate::Estimate;
 use crate::numeric::{Moments, mean};
 
 /// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees. Chosen.
-const TRIM_DEG: f64 = 0.2;
+pub(in crate::analysis) const TRIM_DEG: f64 = 0.2;
 /// Steepest lean that is taken for wind: its tangent. Convention.
 const STEEPEST: f64 = 2.0;
 
 /// How well a vehicle's file knows its drag, as a share of the wind's speed.
 pub const DRAG_SHARE: f64 = 1.0 / 3.0;
+/// The same of a vehicle that is a box: the drag factors of its sides differ by as much (docs/physics.md, 2.6).
+const FACES_SHARE: f64 = 0.08;
 
 /// Mean lean of one drone.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,6 +53,32 @@ impl LeanDrag<'_> {
         }
     }
 
+    /// Standard error of a wind's speed as a share of it; `None` where no wind follows.
+    pub(in crate::analysis) fn share(self) -> Option<f64> {
+        match self {
+            Self::Faces(_) => Some(FACES_SHARE),
+            Self::Table(_) => Some(DRAG_SHARE),
+            Self::Unknown => None,
+        }
+    }
+
+    /// The wind that a lean (tangents forward and to the right) is held against, along the vehicle's own axes, m/s; NaN
+    /// beyond the end of a table, and without drag the lean itself.
+    pub(in crate::analysis) fn flow(self, forward_right: [f64; 2]) -> [f64; 2] {
+        let [forward, right] = forward_right;
+        let size = forward.hypot(right);
+        match self {
+            Self::Faces(_) => forward_right
+                .map(|tangent| self.speed_mps(tangent.abs()).unwrap_or(0.0).copysign(tangent)),
+            // A rotor's drag points along the wind, whichever side the wind comes from.
+            Self::Table(_) if size > 0.0 => {
+                let speed = self.speed_mps(size).unwrap_or(f64::NAN);
+                [speed * forward / size, speed * right / size]
+            }
+            Self::Table(_) | Self::Unknown => forward_right,
+        }
+    }
+
     /// A speed with the error that the drag adds: digits that the drag does not support are none.
     fn with_own_error(self, speed: Estimate) -> Estimate {
         match self {
@@ -73,19 +101,12 @@ impl LeanDrag<'_> {
 impl MeanLean {
     /// The wind that it leans against along its own axes, m/s; without drag, the lean itself.
     fn flow(&self, drag: LeanDrag<'_>) -> [f64; 2] {
-        let [forward, right] = self.forward_right;
-        let size = forward.hypot(right);
-        match drag {
-            LeanDrag::Faces(_) => self
-                .forward_right
-                .map(|tangent| drag.speed_mps(tangent.abs()).unwrap_or(0.0).copysign(tangent)),
-            // A rotor's drag points along the wind, whichever side the wind comes from.
-            LeanDrag::Table(_) if size > 0.0 => {
-                let speed = drag.speed_mps(size).unwrap_or(f64::NAN);
-                [speed * forward / size, speed * right / size]
-            }
-            LeanDrag::Table(_) | LeanDrag::Unknown => self.forward_right,
-        }
+        drag.flow(self.forward_right)
+    }
+
+    /// Tangents of an attitude: forward with the nose down, right with the right side down.
+    pub(in crate::analysis) fn forward_right_of(roll_rad: f64, pitch_rad: f64) -> [f64; 2] {
+        [-pitch_rad.tan(), roll_rad.tan() / pitch_rad.cos()]
     }
 }
 

@@ -1,24 +1,33 @@
 //! Files beside the report of an analysis: the measured fields for other programs, and the finished
 //! study that goes into the report.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::settings::Files;
 use crate::analysis::result::Analysis;
 use crate::base::file::write_with;
 use crate::base::plain::Shown as _;
 use crate::campaign;
-use crate::report::{fields, fields_grid};
+use crate::products::{Origin, fields, fields_grid, geojson, kml};
+use crate::report::Provenance;
 use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
 
 /// Writes the fields, if there are any. Those of an earlier analysis that has become empty go.
-pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), WorkflowError> {
+pub(super) fn write_fields(
+    host: &dyn Host,
+    (analysis, provenance): (&Analysis, &Provenance),
+    folder: &Path,
+    wish: &Files,
+) -> Result<(), WorkflowError> {
+    let origin = origin(provenance, wish);
     let (csv, parquet) = (campaign::fields_csv(folder), campaign::fields_parquet(folder));
     if fields::any(analysis) {
         write_with(&csv, |out| fields::write_csv(analysis, out))?;
         #[cfg(feature = "parquet")]
-        write_parquet(&parquet, crate::report::fields_parquet::parquet(analysis))?;
+        write_parquet(&parquet, crate::products::fields_parquet::parquet(analysis, &origin))?;
         #[cfg(not(feature = "parquet"))]
         remove(&[parquet]);
     } else {
@@ -28,12 +37,86 @@ pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), Wor
     if fields_grid::any(analysis) {
         write_with(&csv, |out| fields_grid::write_csv(analysis, out))?;
         #[cfg(feature = "parquet")]
-        write_parquet(&parquet, crate::report::fields_parquet::grid_parquet(analysis))?;
+        write_parquet(&parquet, crate::products::fields_parquet::grid_parquet(analysis, &origin))?;
         #[cfg(not(feature = "parquet"))]
         remove(&[parquet]);
     } else {
         remove(&[csv, parquet]);
     }
+    write_netcdf(host, (analysis, &origin), folder, wish)?;
+    text(&campaign::fields_geojson(folder), geojson::geojson(analysis))?;
+    text(&campaign::fields_kml(folder), kml::kml(analysis))
+}
+
+/// Origin of the files, by the report's provenance.
+fn origin(provenance: &Provenance, wish: &Files) -> Origin {
+    let inputs = provenance.inputs.iter().map(|file| (file.path.clone(), file.sha256.clone()));
+    Origin {
+        program: provenance.program.clone(),
+        command: provenance.command.clone(),
+        institution: wish.institution.clone(),
+        inputs: inputs.collect(),
+        analysis_sha256: provenance.analysis_sha256.clone(),
+    }
+}
+
+/// Writes a text, or removes that of an earlier analysis.
+fn text(path: &Path, text: Option<String>) -> Result<(), WorkflowError> {
+    let Some(text) = text else {
+        remove(&[path.to_owned()]);
+        return Ok(());
+    };
+    Ok(write_with(path, |out| out.write_all(text.as_bytes()))?)
+}
+
+#[cfg(feature = "netcdf")]
+fn write_netcdf(
+    host: &dyn Host,
+    (analysis, origin): (&Analysis, &Origin),
+    folder: &Path,
+    wish: &Files,
+) -> Result<(), WorkflowError> {
+    use crate::base::file::write_whole;
+    use crate::products::netcdf::{self, Format};
+
+    let format = if wish.netcdf_classic { Format::Classic } else { Format::Netcdf4 };
+    let made = netcdf::files(analysis, origin, format)
+        .map_err(|error| WorkflowError::Failed(error.to_string()))?;
+    let drones = campaign::fields_netcdf(folder);
+    match &made.drones {
+        Some(bytes) => write_whole(&drones, bytes)?,
+        None => remove(&[drones]),
+    }
+    let mut written: Vec<PathBuf> = Vec::new();
+    let single = made.grids.len() == 1;
+    for (number, (flight, bytes)) in made.grids.iter().enumerate() {
+        let name = (!single).then_some(flight.as_str());
+        let mut path = campaign::fields_grid_netcdf(folder, name);
+        if written.contains(&path) {
+            let numbered = format!("{flight}-{number}");
+            path = campaign::fields_grid_netcdf(folder, Some(&numbered));
+        }
+        write_whole(&path, bytes)?;
+        written.push(path);
+    }
+    let mut old = campaign::fields_grids_netcdf(folder);
+    old.retain(|path| !written.contains(path));
+    remove(&old);
+    for sentence in &made.left_out {
+        host.say(sentence);
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "netcdf"))]
+fn write_netcdf(
+    _: &dyn Host,
+    _: (&Analysis, &Origin),
+    folder: &Path,
+    _: &Files,
+) -> Result<(), WorkflowError> {
+    remove(&[campaign::fields_netcdf(folder)]);
+    remove(&campaign::fields_grids_netcdf(folder));
     Ok(())
 }
 

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use self::fields::{read_study, write_fields};
 pub use self::gather::{Request, gather, load_plan};
-pub use self::settings::{Settings, Uncorrected};
+pub use self::settings::{Files, Settings, Uncorrected};
 use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{Found, Work, find, lean_tables};
@@ -139,6 +139,7 @@ impl<'a> Analysing<'a> {
             root: work.root.clone(),
             some_absent,
             basemap: None,
+            files: settings.files.clone(),
         })
     }
 }
@@ -225,6 +226,8 @@ pub struct Analysed {
     some_absent: bool,
     /// Picture of the ground below the report's maps.
     basemap: Option<Basemap>,
+    /// Files for other programs.
+    files: Files,
 }
 
 impl Analysed {
@@ -263,7 +266,7 @@ impl Analysed {
                 let made = report::render_with(&self.analysis, beside, &provenance)?;
                 Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
             },
-            || write_fields(&self.analysis, folder),
+            || write_fields(host, (&self.analysis, &provenance), folder, &self.files),
         );
         page_made.and(fields_made)?;
         // A page that says that nothing was found is written, but there is nothing to point at.

@@ -13,6 +13,17 @@ pub struct Settings {
     pub without: Uncorrected,
     /// Whether the map is also made of the other indicators that the logs hold, and of all together.
     pub combine: bool,
+    /// Files for other programs.
+    pub files: Files,
+}
+
+/// Files for other programs, beside the report.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Files {
+    /// Whether NetCDF files are written in the classic format, for programs without HDF5.
+    pub netcdf_classic: bool,
+    /// Organisation that measured, for the files' attributes; empty: not stated.
+    pub institution: String,
 }
 
 /// Corrections of the map that are left out.

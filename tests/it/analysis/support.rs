@@ -98,6 +98,8 @@ pub(crate) fn plan(purpose: Purpose, segments: Vec<Segment>, slots: u16) -> Plan
             ground_assumed: false,
             orientation_deg: 0.0,
         },
+        site_name: None,
+        utc_offset_h: None,
         limits: Limits {
             max_speed_xy_mps: 8.0,
             max_speed_up_mps: 5.0,

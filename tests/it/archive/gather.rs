@@ -39,7 +39,7 @@ fn a_campaign_is_gathered_with_all_its_rows() {
     );
     // The same values as the table of the campaign has.
     let analysis = Campaign::on_day(0).analysis;
-    let first = updraft::report::fields::rows(&analysis).next().unwrap();
+    let first = updraft::products::fields::rows(&analysis).next().unwrap();
     for (name, value) in
         [("w_mps", first.w_mps), ("low_mps", first.low_mps), ("truth_mps", first.truth_mps)]
     {

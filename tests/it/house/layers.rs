@@ -31,6 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("study", &["base", "numeric", "mission", "flight", "analysis"]),
     ("compare", &["base", "numeric", "mission", "flight", "analysis"]),
     ("archive", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis", "gap"]),
+    ("products", &["base", "numeric", "mission", "flight", "analysis"]),
     ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study", "compare"]),
     ("live", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis"]),
     (
@@ -50,6 +51,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "blind",
             "study",
             "compare",
+            "products",
             "report",
             "archive",
         ],

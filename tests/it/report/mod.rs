@@ -4,7 +4,6 @@ mod browser;
 mod browser_access;
 pub(crate) mod chromium;
 mod explorer;
-mod fields;
 mod gap;
 mod page;
 mod paper;

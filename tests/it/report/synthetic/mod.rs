@@ -149,6 +149,8 @@ pub(crate) fn calibration(
         planned: true,
         orientation_deg: Some(30.0),
         site: Some(site()),
+        site_name: None,
+        utc_offset_h: None,
         simulated: true,
         warnings: Vec::new(),
         unused: Vec::new(),
@@ -450,6 +452,8 @@ pub(crate) fn hover() -> FlightAnalysis {
             posterior_mean: None,
             quality: Vec::new(),
             truth_mps: Some(truth),
+            place: None,
+            wind: None,
         }));
         drones.push(DroneAnalysis {
             slot: Some(slot),
@@ -477,6 +481,8 @@ pub(crate) fn hover() -> FlightAnalysis {
         planned: true,
         orientation_deg: Some(30.0),
         site: Some(site()),
+        site_name: None,
+        utc_offset_h: None,
         simulated: true,
         warnings: Vec::new(),
         unused: Vec::new(),

@@ -1,15 +1,18 @@
 //! The measured fields as a table for other programs: one row for each drone and second.
 //!
 //! The columns are described in `docs/fields.md`. Places are in the show frame (x forward, y left, z
-//! up, m); speeds are m/s, up positive.
+//! up, m) and on the globe; vertical speeds are m/s, up positive.
 
 use std::fmt::Write as _;
 use std::io;
 
-use crate::analysis::result::{Analysis, DroneUpdraft, FilledDrone, QualityFlag, UpdraftMap};
+use crate::analysis::result::{
+    Analysis, DroneUpdraft, DroneWindSeries, FilledDrone, QualityFlag, UpdraftMap,
+};
 use crate::numeric::median;
 
-use super::text::clean;
+use super::where_when::{Fix, FixBy, WhereWhen};
+use super::words::{clean, iso};
 
 /// Names of the columns, in the order of the file.
 pub const COLUMNS: [&str; 13] = [
@@ -31,8 +34,27 @@ pub const COLUMNS: [&str; 13] = [
 /// Names of the columns that follow where a map has a posterior.
 pub const POSTERIOR_COLUMNS: [&str; 2] = ["posterior_mps", "posterior_sd_mps"];
 
+/// Names of the columns that all files end with: where and when, all errors of w in one number, the horizontal wind.
+pub const MORE_COLUMNS: [&str; 11] = [
+    "utc",
+    "latitude_deg",
+    "longitude_deg",
+    "height_agl_m",
+    "altitude_amsl_m",
+    "place_by",
+    "w_se_mps",
+    "u_mps",
+    "u_se_mps",
+    "v_mps",
+    "v_se_mps",
+];
+
 /// Stands among the flags of a drone without a log, whose air its neighbours tell.
-const FILLED: &str = "filled";
+pub const FILLED: &str = "filled";
+/// Standard errors to each side of a 95 % interval.
+const NORMAL: f64 = 1.96;
+/// Numbers of [`FieldRow::more`] that stand before `place_by`.
+const PLACES: usize = 4;
 
 /// A row of the measured fields: one drone in one second.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,13 +89,49 @@ pub struct FieldRow {
     pub posterior_mps: Option<f64>,
     /// Standard deviation of the posterior, all origins of error included, m/s.
     pub posterior_sd_mps: Option<f64>,
+    /// UTC, ms since 1970, if the log has a clock.
+    pub utc_ms: Option<i64>,
+    /// Place on the globe, as far as it is known.
+    pub fix: Fix,
+    /// Standard error of w, all origins included, m/s: the 95 % interval's length over 3.92.
+    pub w_se_mps: Option<f64>,
+    /// Horizontal wind towards east and north, m/s, if it is known.
+    pub wind_mps: Option<[f64; 2]>,
+    /// Standard errors of both, m/s.
+    pub wind_se_mps: Option<[f64; 2]>,
+}
+
+impl FieldRow {
+    /// Values of [`MORE_COLUMNS`] that are numbers, in their order, with the decimals of the CSV.
+    pub(super) fn more(&self) -> [(Option<f64>, usize); 9] {
+        let degrees = |axis: usize| (self.fix.lat_lon_deg.map(|(deg, _)| deg[axis]), 7);
+        let of = |wind: Option<[f64; 2]>, axis: usize| (wind.map(|wind| wind[axis]), 3);
+        [
+            degrees(0),
+            degrees(1),
+            (self.fix.height_m, 2),
+            (self.fix.amsl_m, 2),
+            (self.w_se_mps, 4),
+            of(self.wind_mps, 0),
+            of(self.wind_se_mps, 0),
+            of(self.wind_mps, 1),
+            of(self.wind_se_mps, 1),
+        ]
+    }
+
+    /// Origin of the place on the globe: `log`, `plan`, or nothing.
+    pub fn place_by(&self) -> &'static str {
+        self.fix.lat_lon_deg.map_or("", |(_, by)| by.name())
+    }
 }
 
 /// Rows of all flights, flight by flight and drone by drone; drones without a log come last.
 pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
     analysis.flights.iter().zip(ids(analysis)).flat_map(|(flight, id)| {
-        let maps = flight.map.iter();
-        maps.flat_map(move |map| measured(id.clone(), map).chain(filled(id.clone(), map)))
+        flight.map.iter().flat_map(move |map| {
+            let here = WhereWhen::of(flight);
+            measured(id.clone(), map, here.clone()).chain(filled(id.clone(), map, here))
+        })
     })
 }
 
@@ -91,20 +149,39 @@ pub fn ids(analysis: &Analysis) -> Vec<String> {
 }
 
 /// Rows of the drones with a log.
-fn measured(flight: String, map: &UpdraftMap) -> impl Iterator<Item = FieldRow> + '_ {
+fn measured<'a>(
+    flight: String,
+    map: &'a UpdraftMap,
+    here: WhereWhen<'a>,
+) -> impl Iterator<Item = FieldRow> + 'a {
     map.drones.iter().flat_map(move |drone| {
-        let (flight, times) = (flight.clone(), map.time_s.iter().enumerate());
-        times.map(move |(index, &time_s)| row(&flight, drone, index, time_s))
+        let (flight, here) = (flight.clone(), here.clone());
+        let times = map.time_s.iter().enumerate();
+        times.map(move |(index, &time_s)| row(&flight, drone, (index, time_s), &here))
     })
 }
 
 /// Rows of the drones without one.
-fn filled(flight: String, map: &UpdraftMap) -> impl Iterator<Item = FieldRow> + '_ {
-    let height_m = median(map.drones.iter().map(|drone| drone.height_m).collect());
+fn filled<'a>(
+    flight: String,
+    map: &'a UpdraftMap,
+    here: WhereWhen<'a>,
+) -> impl Iterator<Item = FieldRow> + 'a {
+    let height_m = finite(median(map.drones.iter().map(|drone| drone.height_m).collect()));
     let drones = map.posterior.iter().flat_map(|posterior| &posterior.filled);
     drones.flat_map(move |drone| {
-        let (flight, times) = (flight.clone(), map.time_s.iter().enumerate());
-        times.map(move |(index, &time_s)| filled_row(&flight, drone, height_m, index, time_s))
+        let (flight, here) = (flight.clone(), here.clone());
+        let fix = Fix {
+            lat_lon_deg: here.lat_lon_deg(drone.position_m).map(|deg| (deg, FixBy::Plan)),
+            height_m,
+            amsl_m: height_m.and_then(|height_m| here.amsl_m(height_m)),
+        };
+        let times = map.time_s.iter().enumerate();
+        times.map(move |(index, &time_s)| FieldRow {
+            utc_ms: here.utc_ms(time_s),
+            fix,
+            ..filled_row(&flight, drone, height_m, index, time_s)
+        })
     })
 }
 
@@ -117,7 +194,7 @@ pub fn has_posterior(analysis: &Analysis) -> bool {
 /// Names of the columns of an analysis.
 pub fn columns(analysis: &Analysis) -> Vec<&'static str> {
     let more: &[&str] = if has_posterior(analysis) { &POSTERIOR_COLUMNS } else { &[] };
-    COLUMNS.iter().chain(more).copied().collect()
+    COLUMNS.iter().chain(more).chain(&MORE_COLUMNS).copied().collect()
 }
 
 /// Whether the analysis has any rows.
@@ -153,10 +230,24 @@ fn filled_row(
         truth_mps: None,
         posterior_mps: value(&drone.posterior_mps),
         posterior_sd_mps: value(&drone.posterior_sd_mps),
+        utc_ms: None,
+        fix: Fix::default(),
+        w_se_mps: None,
+        wind_mps: None,
+        wind_se_mps: None,
     }
 }
 
-fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRow {
+fn row(
+    flight: &str,
+    drone: &DroneUpdraft,
+    (index, time_s): (usize, f64),
+    here: &WhereWhen<'_>,
+) -> FieldRow {
+    let wind = |of: fn(&DroneWindSeries) -> &[Option<[f64; 2]>]| {
+        let wind = of(drone.wind.as_ref()?).get(index).copied().flatten();
+        wind.filter(|wind| wind.iter().all(|mps| mps.is_finite()))
+    };
     let interval = drone.interval_mps.get(index).copied().flatten();
     let place = if drone.track_m.is_empty() {
         let at = drone.position_m;
@@ -181,6 +272,11 @@ fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRo
         truth_mps: finite(drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied())),
         posterior_mps: finite(drone.posterior_mps.get(index).copied().flatten()),
         posterior_sd_mps: finite(drone.posterior_sd_mps.get(index).copied().flatten()),
+        utc_ms: here.utc_ms_of(drone, time_s),
+        fix: here.fix(drone, index),
+        w_se_mps: finite(interval.map(|[low, high]| (high - low) / (2.0 * NORMAL))),
+        wind_mps: wind(|wind| &wind.east_north_mps),
+        wind_se_mps: wind(|wind| &wind.se_mps),
     }
 }
 
@@ -222,6 +318,13 @@ pub fn write_csv(analysis: &Analysis, out: &mut dyn io::Write) -> io::Result<()>
         if posterior {
             number(&mut line, row.posterior_mps, 4);
             number(&mut line, row.posterior_sd_mps, 4);
+        }
+        let _ = write!(line, ",{}", row.utc_ms.map(iso).unwrap_or_default());
+        for (index, (value, decimals)) in row.more().into_iter().enumerate() {
+            if index == PLACES {
+                let _ = write!(line, ",{}", row.place_by());
+            }
+            number(&mut line, value, decimals);
         }
         line.push('\n');
         out.write_all(line.as_bytes())?;

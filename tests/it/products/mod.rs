@@ -1,0 +1,7 @@
+//! Files for other programs: tables, NetCDF, maps; read by the programs of those who use them.
+
+mod fields;
+mod firmware;
+mod maps;
+mod netcdf;
+mod support;
