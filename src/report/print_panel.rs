@@ -1,5 +1,4 @@
-//! What a panel has otherwise in print, where it is small: room for labels of ticks, titles that fit, and a
-//! legend below it.
+//! Panels in print, where they are small: room for labels of ticks, titles that fit, and a legend below the frame.
 
 use kuva::plot::legend::{LegendEntry, LegendShape};
 use kuva::plot::scatter::MarkerShape;

@@ -1,5 +1,5 @@
-//! The same PDF with the same bytes each time: the library that makes it names its objects in an order that differs from
-//! run to run.
+//! PDFs in one order of their objects and keys, so that the same figure has the same bytes: the library that makes
+//! them orders them otherwise from run to run.
 //!
 //! Entries of dictionaries are sorted, objects numbered as they are met from the catalogue on. This is for files that
 //! `svg2pdf` writes, one key to a line; what looks otherwise is refused.

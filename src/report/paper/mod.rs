@@ -30,7 +30,7 @@ pub struct Drawn {
 /// A finished figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperFigure {
-    /// Self-contained SVG.
+    /// SVG with the font inside.
     pub svg: String,
     /// One page with the same.
     pub pdf: Vec<u8>,
@@ -48,7 +48,7 @@ pub enum PaperError {
     Svg {
         /// Name of the figure.
         name: String,
-        /// What is wrong with it.
+        /// Error of the reader of SVG.
         source: SvgError,
     },
     /// There is no PDF of it.
@@ -56,7 +56,7 @@ pub enum PaperError {
     Pdf {
         /// Name of the figure.
         name: String,
-        /// What is wrong with it.
+        /// Reason in words.
         reason: String,
     },
 }
