@@ -1,5 +1,5 @@
-//! What a log tells beside the vertical air speed, at the seconds of the map: the place of the drone on the globe, and
-//! the horizontal wind that it leans against.
+//! Place and wind beside the vertical air speed, at the seconds of the map: where a drone was on the globe, and the
+//! horizontal wind that it leans against.
 //!
 //! The wind is that of the map's own means over 10 s: the drag of the vehicle turns the mean lean into the flow that meets
 //! it, the heading turns that flow to north, and its own way over ground is added. Errors are those of the drag and of a

@@ -155,9 +155,12 @@ fn measured<'a>(
     here: WhereWhen<'a>,
 ) -> impl Iterator<Item = FieldRow> + 'a {
     map.drones.iter().flat_map(move |drone| {
-        let (flight, here) = (flight.clone(), here.clone());
+        let (flight, here, zero) = (flight.clone(), here.clone(), here.zero_of(drone));
         let times = map.time_s.iter().enumerate();
-        times.map(move |(index, &time_s)| row(&flight, drone, (index, time_s), &here))
+        times.map(move |(index, &time_s)| FieldRow {
+            utc_ms: zero.and_then(|zero| zero.utc_ms(time_s)),
+            ..row(&flight, drone, (index, time_s), &here)
+        })
     })
 }
 
@@ -272,7 +275,7 @@ fn row(
         truth_mps: finite(drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied())),
         posterior_mps: finite(drone.posterior_mps.get(index).copied().flatten()),
         posterior_sd_mps: finite(drone.posterior_sd_mps.get(index).copied().flatten()),
-        utc_ms: here.utc_ms_of(drone, time_s),
+        utc_ms: None,
         fix: here.fix(drone, index),
         w_se_mps: finite(interval.map(|[low, high]| (high - low) / (2.0 * NORMAL))),
         wind_mps: wind(|wind| &wind.east_north_mps),

@@ -1,4 +1,4 @@
-//! What other programs take away of an analysis: the measured fields as tables, as NetCDF by the CF conventions, and on
+//! Files for other programs: the measured fields of an analysis as tables, as NetCDF by the CF conventions, and on
 //! maps (KML, GeoJSON).
 //!
 //! All are pure functions of the analysis and of its [`Origin`]: equal input gives equal bytes. Quantities, formulas and
@@ -18,7 +18,7 @@ mod words;
 
 use crate::analysis::result::Analysis;
 
-pub use where_when::{Fix, FixBy, WhereWhen};
+pub use where_when::{Fix, FixBy, WhereWhen, Zero};
 pub use words::clean;
 
 /// Whether drones can be put on a map: any has a value and a place.

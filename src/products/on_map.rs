@@ -92,7 +92,8 @@ fn spot(
     let wind =
         |axis: usize| mean(winds.clone().map(|wind| wind[axis]).filter(|mps| mps.is_finite()));
     let times = measured.iter().filter_map(|index| map.time_s.get(*index));
-    let times = times.filter_map(|time_s| here.utc_ms_of(drone, *time_s));
+    let zero = here.zero_of(drone);
+    let times = times.filter_map(|time_s| zero?.utc_ms(*time_s));
     let utc_ms = times.clone().min().zip(times.max()).map(|(first, last)| [first, last]);
     let both = |pair: [f64; 2]| pair.iter().all(|value| value.is_finite()).then_some(pair);
     Some(Spot {

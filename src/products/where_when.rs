@@ -43,7 +43,7 @@ pub struct Fix {
     pub amsl_m: Option<f64>,
 }
 
-/// What gives the rows of a flight their place and time.
+/// Places and times of a flight's rows.
 #[derive(Clone, Debug)]
 pub struct WhereWhen<'a> {
     flight: &'a FlightAnalysis,
@@ -84,16 +84,16 @@ impl<'a> WhereWhen<'a> {
 
     /// UTC of a show time of the whole fleet, ms since 1970.
     pub fn utc_ms(&self, time_s: f64) -> Option<i64> {
-        after(self.zero?, time_s)
+        Zero::of(self.zero?).utc_ms(time_s)
     }
 
-    /// UTC of a show time of one drone, ms since 1970: by its own log where its clock is not the fleet's.
-    pub fn utc_ms_of(&self, drone: &DroneUpdraft, time_s: f64) -> Option<i64> {
+    /// Show time 0 of one drone: by its own log where its clock is not the fleet's.
+    pub fn zero_of(&self, drone: &DroneUpdraft) -> Option<Zero> {
         let own = self.drone(drone).and_then(|found| found.clock.start);
         let common = self.zero.filter(|zero| {
             own.is_none_or(|own| (own.total_ms() - zero.total_ms()).abs() <= ONE_CLOCK_MS)
         });
-        after(common.or(own)?, time_s)
+        common.or(own).map(Zero::of)
     }
 
     /// The drone's log in the same flight.
@@ -163,10 +163,20 @@ fn whole_second_ms(ms: i64) -> i64 {
     if (second - ms).abs() <= ONE_CLOCK_MS { second } else { ms }
 }
 
-/// UTC of a show time that began at `zero`, ms since 1970.
-fn after(zero: GpsTime, time_s: f64) -> Option<i64> {
-    let ms = (1000.0 * time_s).round();
-    (ms.abs() < 1e15).then(|| zero.to_unix_ms().saturating_add(ms as i64))
+/// Show time 0, ms of UTC since 1970.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Zero(i64);
+
+impl Zero {
+    fn of(start: GpsTime) -> Self {
+        Self(start.to_unix_ms())
+    }
+
+    /// UTC of a show time, ms since 1970.
+    pub fn utc_ms(self, time_s: f64) -> Option<i64> {
+        let ms = (1000.0 * time_s).round();
+        (ms.abs() < 1e15).then(|| self.0.saturating_add(ms as i64))
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Words that the files have in common.
 
+#[cfg(any(feature = "netcdf", feature = "parquet"))]
 use super::Origin;
 use crate::analysis::result::Analysis;
 use crate::base::calendar::date;
@@ -11,6 +12,7 @@ pub fn clean(text: &str) -> String {
 }
 
 /// Documents of the method.
+#[cfg(any(feature = "netcdf", feature = "parquet"))]
 pub(super) const REFERENCES: &str = "Thermal Updraft Profiling with an Array of Show Drones; docs/products.md, \
      docs/fields.md and docs/errors.md of updraft";
 
@@ -29,6 +31,7 @@ pub(super) fn title(analysis: &Analysis) -> String {
 }
 
 /// Name and version of the program.
+#[cfg(any(feature = "netcdf", feature = "parquet"))]
 pub(super) fn program(analysis: &Analysis, origin: &Origin) -> String {
     clean(if origin.program.is_empty() { &analysis.made_by } else { &origin.program })
 }

@@ -1,4 +1,4 @@
-//! What a file says of itself: attributes of CF and of the Attribute Convention for Data Discovery (ACDD 1.3).
+//! Global attributes: those of CF and of the Attribute Convention for Data Discovery (ACDD 1.3).
 //!
 //! Nothing in it is of the day on which the file was made: the same analysis gives the same bytes.
 

@@ -36,7 +36,7 @@ pub struct Files {
     pub drones: Option<Vec<u8>>,
     /// Flights with a posterior between their drones: name of the flight, file.
     pub grids: Vec<(String, Vec<u8>)>,
-    /// What is left out, and why, one sentence each.
+    /// Sentences about the parts that are left out, with the reason.
     pub left_out: Vec<String>,
 }
 

@@ -102,7 +102,7 @@ fn all() -> [Speed; 10] {
         Speed {
             name: "w_posterior",
             standard_name: W,
-            long_name: "vertical air speed by all drones, seconds and the calibration together",
+            long_name: "vertical air speed, posterior mean (all drones and seconds together)",
             errors: Some("w_posterior_se"),
             get: |row| row.posterior_mps,
         },

@@ -238,7 +238,7 @@ pub(super) fn beside(long_name: &str, units: &str) -> Vec<Attribute<'static>> {
 pub(super) fn time_attributes(bounds: &str) -> Vec<Attribute<'static>> {
     vec![
         ("standard_name", text("time")),
-        ("long_name", text("UTC in the middle of the 10 s that values are means of")),
+        ("long_name", text("UTC (middle of the 10 s of a mean)")),
         ("units", text("seconds since 1970-01-01T00:00:00Z")),
         ("calendar", text("standard")),
         ("units_metadata", text("leap_seconds: none")),
