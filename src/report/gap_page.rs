@@ -8,6 +8,7 @@ use crate::gap::Verdict;
 
 use super::figures::gap::{drones, ladder, map};
 use super::fill::{OPEN_LIMIT, common, fill};
+#[cfg(any(feature = "paper-figures", test))]
 use super::format::Format;
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,

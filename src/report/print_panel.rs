@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_long_title_begins_further_left_and_a_longer_one_is_cut() {
         assert_eq!(title("(a) Short", 66.0, 300.0, 14.0), ("(a) Short".to_owned(), 66.0));
-        let (text, left) = title("(b) A title of thirty letters.", 66.0, 300.0, 14.0);
+        let (text, left) = title("(b) A title of thirty letters.", 66.0, 270.0, 14.0);
         assert!(left < 66.0 && text.ends_with("letters."), "{text} at {left}");
         assert!(title(&"long ".repeat(30), 66.0, 300.0, 14.0).0.ends_with('…'));
     }
