@@ -14,7 +14,9 @@ use super::axis::Axis;
 use super::colour::{INK, RULE};
 use super::format::Format;
 use super::legend::{self, Corner, Inked};
-use super::print_panel::{fitting, legend_below, legend_height, title, with_room_between, with_room_for_labels};
+use super::print_panel::{
+    fitting, legend_below, legend_height, title, with_room_between, with_room_for_labels,
+};
 use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};

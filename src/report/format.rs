@@ -80,11 +80,7 @@ impl Format {
 
     /// Where panels lie that lie at `places` on a sheet of the page, and the size of their sheet: [x, y, width,
     /// height]. Narrow figures have them below each other.
-    pub(super) fn arrange(
-        self,
-        page: [f64; 2],
-        places: &[[f64; 4]],
-    ) -> ([f64; 2], Vec<[f64; 4]>) {
+    pub(super) fn arrange(self, page: [f64; 2], places: &[[f64; 4]]) -> ([f64; 2], Vec<[f64; 4]>) {
         if !self.is_print() {
             return (page, places.to_vec());
         }
@@ -141,6 +137,9 @@ mod tests {
     #[test]
     fn lengths_are_in_millimetres_in_print() {
         assert_eq!(Format::PAGE.lengths([1040.0, 460.0]), "width=\"1040\" height=\"460\"");
-        assert_eq!(Format::column(83.0).lengths([400.0, 200.0]), "width=\"83mm\" height=\"41.50mm\"");
+        assert_eq!(
+            Format::column(83.0).lengths([400.0, 200.0]),
+            "width=\"83mm\" height=\"41.50mm\""
+        );
     }
 }

@@ -7,8 +7,8 @@ use minijinja::value::Value;
 use crate::gap::Verdict;
 
 use super::figures::gap::{drones, ladder, map};
-use super::format::Format;
 use super::fill::{OPEN_LIMIT, common, fill};
+use super::format::Format;
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
 };

@@ -104,7 +104,8 @@ pub(super) fn air_section(
         Some("No drone gave an estimate of the vertical air speed.")
     };
     let statistics = flight.statistics.as_ref().map(|found| {
-        let correlations = correlation::figure(flight, &key, found, format).map(|f| figures.show(f));
+        let correlations =
+            correlation::figure(flight, &key, found, format).map(|f| figures.show(f));
         let averaging = found
             .averaging
             .as_ref()

@@ -6,8 +6,8 @@ use minijinja::value::Value;
 use crate::study::sensitivity::{Influence, OutcomeResult, SensitivityResult};
 
 use super::figures::sensitivity::figures;
-use super::format::Format;
 use super::fill::{common, fill};
+use super::format::Format;
 use super::page::label;
 use super::sensitivity_terminal::{
     campaigns, capital, decimals, explained, in_order, numbers, spread,

@@ -7,8 +7,8 @@ use crate::study::paper;
 use crate::study::result::StudyResult;
 
 use super::figures::study::{self as figure_study, rho};
-use super::format::Format;
 use super::fill::{common, fill};
+use super::format::Format;
 use super::page::label;
 use super::study_terminal::{ConditionWords, range_rows, windows};
 use super::text::{NONE, clean, count, estimate, symbol, unit};

@@ -102,7 +102,12 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }
 
-fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, (symbol, format): (&str, Format)) -> Panel {
+fn distance_panel(
+    title: &str,
+    of: &DistanceCorrelation,
+    y: &Axis,
+    (symbol, format): (&str, Format),
+) -> Panel {
     let farthest = of.classes.iter().map(|class| class.distance_m);
     let mut x = Axis::around("distance between drones (m)", farthest.chain([0.0]), 1.0);
     x.min = 0.0;
@@ -120,7 +125,8 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, (symbol, form
     if format.is_print() {
         for class in &of.classes {
             let ends = class.correlations.first().zip(class.correlations.last());
-            let reach = ends.map(|(low, high)| [(class.distance_m, *low), (class.distance_m, *high)]);
+            let reach =
+                ends.map(|(low, high)| [(class.distance_m, *low), (class.distance_m, *high)]);
             panel.keep_clear(reach.as_ref().map_or(&[], |reach| reach.as_slice()));
         }
     }

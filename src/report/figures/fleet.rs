@@ -64,8 +64,10 @@ pub(in crate::report) fn figure(
     let gap = (0.07 * cell_w).clamp(1.0, 8.0);
     let pitch = [cell_w, ASPECT * cell_w];
     let size = [pitch[0] * places.columns as f64, pitch[1] * places.rows as f64];
-    let mut drawing =
-        Drawing::new(format, [format.width(), TOP + size[1].max(format.choose(200.0, 150.0)) + 50.0]);
+    let mut drawing = Drawing::new(
+        format,
+        [format.width(), TOP + size[1].max(format.choose(200.0, 150.0)) + 50.0],
+    );
     let corner =
         |row: usize, column: usize| [LEFT + column as f64 * pitch[0], TOP + row as f64 * pitch[1]];
     if let Some(scale) = &scale {

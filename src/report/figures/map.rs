@@ -41,8 +41,11 @@ impl Room {
             return Self { decimals, all: cell_px >= ERROR_PX };
         }
         // A sign, a digit and the point beside them, in the smallest text that is read.
-        let fits = |decimals: usize| width_of("+0.", format.text(0.0), true)
-            + width_of("0", format.text(0.0), true) * decimals as f64 <= cell_px;
+        let fits = |decimals: usize| {
+            width_of("+0.", format.text(0.0), true)
+                + width_of("0", format.text(0.0), true) * decimals as f64
+                <= cell_px
+        };
         let decimals = [decimals, decimals.min(2)].into_iter().find(|decimals| fits(*decimals));
         Self { decimals, all: decimals.is_some() && cell_px >= PRINT_ERROR_PX }
     }
@@ -71,7 +74,8 @@ enum Truth {
 impl MapSheet {
     fn of(format: Format, truth_known: bool) -> Self {
         let wide = format.width();
-        let truth = truth_known.then_some(if format.is_narrow() { Truth::Below } else { Truth::Beside });
+        let truth =
+            truth_known.then_some(if format.is_narrow() { Truth::Below } else { Truth::Beside });
         let top = if truth_known { 40.0 } else { 16.0 };
         // Two maps beside each other, or one that fills the sheet.
         let across = wide - PRINT_LEFT - PRINT_RIGHT;

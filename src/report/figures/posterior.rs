@@ -9,8 +9,8 @@ use crate::report::colour::{INK, diverging, sequential};
 use crate::report::format::Format;
 use crate::report::frames::Frames;
 use crate::report::posterior_grid::{Cells, GridField};
-use crate::report::raster::{image, image_of_sizes};
 use crate::report::print_panel::title;
+use crate::report::raster::{image, image_of_sizes};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, fixed, signed};
 
@@ -51,8 +51,7 @@ pub(in crate::report) fn figure(
         [[first, TOP], [first + width + format.choose(GAP, PRINT_GAP), TOP]]
     };
     let lowest = corners[1][1] + height;
-    let drawn_size =
-        [format.choose(corners[1][0] + width + 90.0, format.width()), lowest + 58.0];
+    let drawn_size = [format.choose(corners[1][0] + width + 90.0, format.width()), lowest + 58.0];
     let mut drawing = Drawing::new(format, drawn_size);
     for (index, [left, top]) in corners.into_iter().enumerate() {
         let projection = Projection::new(&ground, [left, top], room, 0.0)?;

@@ -34,11 +34,18 @@ const STRETCHES: usize = 8;
 const FEWEST: usize = 5;
 
 /// All figures that the study has data for.
-pub(in crate::report) fn figures(study: &SensitivityResult, points: &Points, format: Format) -> Vec<Figure> {
+pub(in crate::report) fn figures(
+    study: &SensitivityResult,
+    points: &Points,
+    format: Format,
+) -> Vec<Figure> {
     let bars = influences(study, format);
     let scatter = study.outcomes.iter().enumerate().take(MOST_OUTCOMES);
     bars.into_iter()
-        .chain(scatter.filter_map(|(index, outcome)| scattered(study, points, (index, outcome), format)))
+        .chain(
+            scatter
+                .filter_map(|(index, outcome)| scattered(study, points, (index, outcome), format)),
+        )
         .collect()
 }
 
@@ -62,8 +69,7 @@ fn influences(study: &SensitivityResult, format: Format) -> Option<Figure> {
     let columns = if format.is_narrow() { 1 } else { COLUMNS };
     let size = [format.width() / columns as f64, 74.0 + ROW * rows as f64 + 44.0];
     let sheet_rows = shown.len().div_ceil(columns);
-    let mut drawing =
-        Drawing::new(format, [format.width(), sheet_rows as f64 * size[1] + 24.0]);
+    let mut drawing = Drawing::new(format, [format.width(), sheet_rows as f64 * size[1] + 24.0]);
     for (index, outcome) in shown.iter().enumerate() {
         let corner = [(index % columns) as f64 * size[0], (index / columns) as f64 * size[1]];
         panel(&mut drawing, outcome, corner, size, is_sobol);

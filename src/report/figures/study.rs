@@ -38,7 +38,10 @@ struct Coloured<'a> {
 
 /// All figures that the study has data for.
 pub(in crate::report) fn figures(study: &StudyResult, format: Format) -> Vec<Figure> {
-    [still(study, format), winds(study, format), errors(study, format)].into_iter().flatten().collect()
+    [still(study, format), winds(study, format), errors(study, format)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// A and u0 that all fits hold.

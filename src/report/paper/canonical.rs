@@ -19,7 +19,8 @@ pub(super) fn canonical(pdf: &[u8]) -> Option<Vec<u8>> {
     let tail = std::str::from_utf8(pdf.get(table..)?).ok()?;
     let objects = objects(pdf, table, tail)?;
     let trailer = tail.split_once("trailer")?.1;
-    let [root, info] = ["/Root ", "/Info "].map(|key| Some(references(after(trailer, key)?).next()?.2));
+    let [root, info] =
+        ["/Root ", "/Info "].map(|key| Some(references(after(trailer, key)?).next()?.2));
     let (root, info) = (root?, info?);
     // Numbers by the first time that an object is met.
     let mut order = vec![root, info];
@@ -39,7 +40,9 @@ pub(super) fn canonical(pdf: &[u8]) -> Option<Vec<u8>> {
     for (id, number) in order.iter().zip(1..) {
         let object = objects.get(id)?;
         offsets.push(out.len());
-        out.extend(format!("{number} 0 obj\n{}", renumbered(&object.dictionary, &numbers)?).bytes());
+        out.extend(
+            format!("{number} 0 obj\n{}", renumbered(&object.dictionary, &numbers)?).bytes(),
+        );
         out.extend(object.stream);
     }
     let start = out.len();
@@ -164,7 +167,10 @@ mod tests {
         assert_eq!(canonical_one, canonical(&canonical_one).unwrap(), "nothing more to do");
         let text = String::from_utf8(canonical_one).unwrap();
         assert!(text.contains("/f0 4 0 R\n    /f1 5 0 R"), "{text}");
-        assert!(text.contains("4 0 obj\n<<\n  /Length 3\n  /Name /Regular\n>>\nstream\na\nb"), "{text}");
+        assert!(
+            text.contains("4 0 obj\n<<\n  /Length 3\n  /Name /Regular\n>>\nstream\na\nb"),
+            "{text}"
+        );
     }
 
     #[test]

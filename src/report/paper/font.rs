@@ -99,6 +99,8 @@ mod tests {
         let plain = embedded("<svg><text>a</text></svg>");
         assert!(plain.starts_with("<svg><style>@font-face") && plain.contains("font-weight:400"));
         assert!(!plain.contains("font-weight:700"));
-        assert!(embedded("<svg><text font-weight=\"bold\">a</text></svg>").contains("font-weight:700"));
+        assert!(
+            embedded("<svg><text font-weight=\"bold\">a</text></svg>").contains("font-weight:700")
+        );
     }
 }

@@ -16,7 +16,6 @@ use crate::analysis::result::Analysis;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
 
-
 /// A figure that was drawn for a column, before it has its font.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {

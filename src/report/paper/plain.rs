@@ -110,7 +110,10 @@ mod tests {
         );
         assert_eq!(of("<a href=\"b.svg\"><circle r=\"1\"/></a>"), "<circle r=\"1\"/>");
         assert_eq!(of("<style>g { x: var(--y) }</style><!-- c --><g></g>"), "<g></g>");
-        assert_eq!(of("<image style=\"image-rendering:auto\" href=\"data:\"/>"), "<image xlink:href=\"data:\"/>");
+        assert_eq!(
+            of("<image style=\"image-rendering:auto\" href=\"data:\"/>"),
+            "<image xlink:href=\"data:\"/>"
+        );
     }
 
     #[test]

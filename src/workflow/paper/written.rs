@@ -99,10 +99,7 @@ fn tell(host: &dyn Host, width_mm: f64, all: &Written, folder: &Path) {
         ));
     }
     if !all.too_high.is_empty() {
-        host.say(&format!(
-            "higher than a page at {width_mm} mm: {}",
-            listed(&all.too_high)
-        ));
+        host.say(&format!("higher than a page at {width_mm} mm: {}", listed(&all.too_high)));
     }
     if !all.missing.is_empty() {
         let missing: Vec<String> = all.missing.iter().map(char::to_string).collect();

@@ -9,7 +9,10 @@ fn figures_are_written_for_each_width_and_nothing_else_is_touched() {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("print/83mm")).unwrap();
     fs::write(bench.path("print/83mm/mine.tex"), "mine").unwrap();
-    let args = [&["run", "--grid", "1x2", "--no-study", "-o", "flown", "--paper-figures", "print"][..], SHORT];
+    let args = [
+        &["run", "--grid", "1x2", "--no-study", "-o", "flown", "--paper-figures", "print"][..],
+        SHORT,
+    ];
     let done = bench.expect(0, &args.concat());
     assert!(done.err.contains("83 mm wide, as SVG and PDF -> print/83mm"), "{done}");
     let figures = |folder: &str, ending: &str| -> Vec<String> {

@@ -50,10 +50,12 @@ fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
 }
 
 fn tree(svg: &str) -> Tree {
-    let mut options = Options { dpi: 72.0, font_family: "Noto Sans".to_owned(), ..Options::default() };
+    let mut options =
+        Options { dpi: 72.0, font_family: "Noto Sans".to_owned(), ..Options::default() };
     let fonts = options.fontdb_mut();
     for weight in ["Regular", "Bold"] {
-        let path = format!("{}/templates/report/vendor/NotoSans/{weight}.ttf", env!("CARGO_MANIFEST_DIR"));
+        let path =
+            format!("{}/templates/report/vendor/NotoSans/{weight}.ttf", env!("CARGO_MANIFEST_DIR"));
         fonts.load_font_file(path).expect("the font");
     }
     Tree::from_str(svg, &options).expect("SVG")
@@ -93,10 +95,20 @@ fn an_svg_is_plain_and_has_its_width_and_its_font() {
             let head = svg.split('>').next().expect("a head");
             assert_eq!(attribute(head, "width"), format!("{width_mm}mm"), "{name}");
             assert!(attribute(head, "height").ends_with("mm"), "{name}");
-            assert!(svg.contains("@font-face") && svg.contains("data:font/woff2;base64,"), "{name}");
-            for foreign in
-                ["var(--", "<script", "class=", "data-", "<a ", "aria-", "prefers-color", "transparent"]
-            {
+            assert!(
+                svg.contains("@font-face") && svg.contains("data:font/woff2;base64,"),
+                "{name}"
+            );
+            for foreign in [
+                "var(--",
+                "<script",
+                "class=",
+                "data-",
+                "<a ",
+                "aria-",
+                "prefers-color",
+                "transparent",
+            ] {
                 let beyond = svg.replace("data:", "").replace("data-uri", "");
                 assert!(!beyond.contains(foreign), "{name}: {foreign}");
             }
@@ -147,8 +159,13 @@ fn a_pdf_is_a_page_of_that_size_with_its_fonts() {
         for (name, figure) in finished(width_mm) {
             let text = String::from_utf8_lossy(&figure.pdf);
             let (_, media) = text.split_once("/MediaBox [").expect("a page");
-            let sizes: Vec<f64> =
-                media.split(']').next().expect("it").split(' ').map(|n| n.parse().expect(n)).collect();
+            let sizes: Vec<f64> = media
+                .split(']')
+                .next()
+                .expect("it")
+                .split(' ')
+                .map(|n| n.parse().expect(n))
+                .collect();
             assert!((sizes[2] - width_mm * PT).abs() < 0.01, "{name}: {sizes:?}");
             assert!(text.contains("/CIDFontType2") && text.contains("/FontFile2"), "{name}");
             assert!(!text.contains("/Type3") && !text.contains("/CreationDate"), "{name}");
@@ -187,10 +204,14 @@ fn the_same_figures_are_the_same_bytes() {
 
 #[test]
 fn what_cannot_be_read_in_one_column_is_not_made() {
-    let names = |width_mm| finished(width_mm).into_iter().map(|(name, _)| name).collect::<BTreeSet<_>>();
+    let names =
+        |width_mm| finished(width_mm).into_iter().map(|(name, _)| name).collect::<BTreeSet<_>>();
     let (single, double) = (names(83.0), names(171.0));
     let lacking: Vec<&String> = double.difference(&single).collect();
-    assert!(lacking.iter().all(|name| name.starts_with("fig5") || name.starts_with("gap-map")), "{lacking:?}");
+    assert!(
+        lacking.iter().all(|name| name.starts_with("fig5") || name.starts_with("gap-map")),
+        "{lacking:?}"
+    );
     assert!(lacking.iter().any(|name| name.starts_with("fig5")), "six maps beside each other");
     assert!(single.is_subset(&double));
 }

@@ -47,7 +47,8 @@ pub(in crate::report) fn figure(map: &MapComparison, key: &str, format: Format) 
     let scale = limit(places.iter().flat_map(|place| [place.reference.value, place.other.value]));
     let of_change = limit(places.iter().map(|place| place.change.value));
     let wide = format.choose(70.0 + 3.0 * shift + 110.0 + 100.0, format.width());
-    let mut drawing = Drawing::new(format, [wide, TOP + height.max(format.choose(200.0, 160.0)) + 58.0]);
+    let mut drawing =
+        Drawing::new(format, [wide, TOP + height.max(format.choose(200.0, 160.0)) + 58.0]);
     let label = format.choose(LABEL, (side / 8.0) as usize);
     // Numbers of the smallest size that is read.
     let cell_px = at.first().map_or(0.0, |place| first.cell(*place)[2]);

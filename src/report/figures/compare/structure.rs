@@ -20,7 +20,11 @@ const PANEL: [f64; 2] = [518.0, 350.0];
 const LABEL: usize = 30;
 
 /// The correlations; `None` without any.
-pub(in crate::report) fn figure(of: &StructureComparison, key: &str, format: Format) -> Option<Figure> {
+pub(in crate::report) fn figure(
+    of: &StructureComparison,
+    key: &str,
+    format: Format,
+) -> Option<Figure> {
     let mut panels = Vec::new();
     if !of.distance.is_empty() {
         panels.push(over_distance(of));

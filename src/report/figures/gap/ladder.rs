@@ -41,7 +41,12 @@ pub(in crate::report) fn figure(verdict: &Verdict, format: Format) -> Option<Fig
     let mut panel = Panel::new(if whole { "(b) What is left" } else { "" }, x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
     let size = if whole { PANEL } else { [1040.0, PANEL[1]] };
-    residuals(&mut panel, &rows, (0.3 * size[0].min(format.width()) / rows.len() as f64).clamp(4.0, 22.0), true);
+    residuals(
+        &mut panel,
+        &rows,
+        (0.3 * size[0].min(format.width()) / rows.len() as f64).clamp(4.0, 22.0),
+        true,
+    );
     let left = if whole { 522.0 } else { 0.0 };
     panels.push((panel, [left, KEY_HEIGHT, size[0], size[1]]));
     let mut sheet = Sheet::of(format, [1040.0, KEY_HEIGHT + PANEL[1]], panels);
