@@ -161,13 +161,24 @@ pub(super) fn compare(couple: &Couple<'_>, a: &FleetLaws, b: &FleetLaws) -> Opti
         // The paper's fits take the air that all drones shared for noise of each window.
         let is_known = a.is_split && b.is_split && se > 0.0;
         let z = is_known.then(|| spread.median / se);
+        let (reference, other) = (a.fleet.along(gradient), b.fleet.along(gradient));
+        let level = level_of(&before, &after, &changes);
+        let half = spread.median / 2.0;
+        let in_both = |side: f64, shared: Estimate| {
+            level.map(|level| {
+                let se = (shared.se.powi(2) + spread.median_variance / 2.0).sqrt();
+                Estimate::new(level + side * half, se)
+            })
+        };
         fleet.push(FleetChange {
             quantity,
             unit: a.form.unit(quantity, &a.unit),
             speed_mps,
-            reference: a.fleet.along(gradient),
-            other: b.fleet.along(gradient),
+            reference,
+            other,
             change: Estimate::new(spread.median, se),
+            reference_in_both: in_both(-1.0, reference),
+            other_in_both: in_both(1.0, other),
             z,
             p_value: z.map(two_sided),
             scatter: spread.scatter,
@@ -203,6 +214,17 @@ pub(super) fn compare(couple: &Couple<'_>, a: &FleetLaws, b: &FleetLaws) -> Opti
         drones,
         curve: curve(a, b),
     })
+}
+
+/// Where the drones in both are between their two flights: the median, weighted as that of their changes.
+fn level_of(before: &[Estimate], after: &[Estimate], changes: &[Estimate]) -> Option<f64> {
+    let all_known = changes.iter().all(|change| change.se > 0.0 && change.se.is_finite());
+    let values: Vec<_> = (before.iter().zip(after).zip(changes))
+        .map(|((a, b), change)| {
+            (f64::midpoint(a.value, b.value), if all_known { 1.0 / change.se } else { 1.0 })
+        })
+        .collect();
+    weighted_median(&values)
 }
 
 /// Corrects the tests of all drones of a pair together.

@@ -148,6 +148,13 @@ pub struct FleetChange {
     pub other: Estimate,
     /// Change of the drones in both, with both common errors, each counted once.
     pub change: Estimate,
+    /// The drones in both, in the reference: the median of their means over both flights less half of the change, with
+    /// the error that they share.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_in_both: Option<Estimate>,
+    /// The drones in both, in the other flight: that median and half of the change.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_in_both: Option<Estimate>,
     /// The change over its error; absent: the error is not known, or without what the drones share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,

@@ -86,15 +86,16 @@ pub(super) fn nice_step(raw: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
-/// The end of a symmetric scale around a size, whose half is round, too: 1, 2, 4, 6, 8 or 10 times a power
-/// of ten.
+/// Ends of symmetric scales, as multiples of a power of ten: so close that colours are not washed out.
+const ENDS: [f64; 11] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+
+/// The end of a symmetric scale around a size: round, and no more than a third above it.
 pub(super) fn scale_end(largest: f64) -> f64 {
     if !(largest.is_finite() && largest > 0.0) {
         return 1.0;
     }
     let power = 10_f64.powf(largest.log10().floor());
-    [1.0, 2.0, 4.0, 6.0, 8.0, 10.0]
-        .into_iter()
+    ENDS.into_iter()
         .map(|factor| factor * power)
         .find(|&end| end >= largest * (1.0 - 1e-9))
         .unwrap_or(10.0 * power)
@@ -129,8 +130,10 @@ mod tests {
     }
 
     #[test]
-    fn scales_and_their_halves_end_on_round_numbers() {
-        for (size, end) in [(0.52, 0.6), (1.21, 2.0), (0.0301, 0.04), (4.0, 4.0), (9.1, 10.0)] {
+    fn scales_end_on_round_numbers_close_to_what_they_hold() {
+        for (size, end) in
+            [(0.52, 0.6), (1.02, 1.25), (2.48, 2.5), (0.0301, 0.04), (4.0, 4.0), (9.1, 10.0)]
+        {
             assert!((scale_end(size) - end).abs() < 1e-9, "{size}");
         }
         assert_eq!(scale_end(f64::NAN), 1.0);

@@ -4,29 +4,31 @@ use minijinja::context;
 use minijinja::value::Value;
 
 use crate::compare::result::{
-    Comparison, DroneChange, LawComparison, MapComparison, Pair, Quantity,
+    ComparedCampaign, Comparison, DroneChange, LawComparison, MapComparison, Pair, Quantity,
 };
 
+use super::compare_sides::{ComparedFiles, links};
 use super::compare_terminal::title;
 use super::compare_words as words;
 use super::figures::compare::{drones, laws, maps, structure};
 use super::fill::{common, fill};
 use super::format::Format;
-use super::text::{NONE, clean, count, estimate, slug, unit};
+use super::text::{NONE, clean, count, slug, unit};
 use super::{Figure, Provenance, Report, ReportError};
 
 const PAGE: &str = include_str!("../../templates/report/compare.html");
 
-/// Renders the page and the figures of a comparison.
+/// Renders the page and the figures of a comparison. `files`: what is there of each campaign, in their order.
 ///
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.
 pub fn render_comparison(
     comparison: &Comparison,
     provenance: &Provenance,
+    files: &[ComparedFiles],
 ) -> Result<Report, ReportError> {
     let mut figures = Figures::default();
-    let values = values(comparison, provenance, &mut figures);
+    let values = values(comparison, provenance, files, &mut figures);
     let html = fill("compare.html", PAGE, values)?;
     Ok(Report { html, figures: figures.files, data: Vec::new() })
 }
@@ -35,16 +37,21 @@ pub fn render_comparison(
 #[cfg(any(feature = "paper-figures", test))]
 pub(super) fn figures(comparison: &Comparison, format: Format) -> Vec<(String, String)> {
     let mut figures = Figures { format, ..Figures::default() };
-    values(comparison, &Provenance::default(), &mut figures);
+    values(comparison, &Provenance::default(), &[], &mut figures);
     figures.files
 }
 
-fn values(comparison: &Comparison, provenance: &Provenance, figures: &mut Figures) -> Value {
+fn values(
+    comparison: &Comparison,
+    provenance: &Provenance,
+    files: &[ComparedFiles],
+    figures: &mut Figures,
+) -> Value {
     let laws: Vec<Value> = comparison
         .laws
         .iter()
         .enumerate()
-        .map(|(index, law)| law_section(law, index, figures))
+        .map(|(index, law)| law_section(comparison, law, index, figures))
         .collect();
     let maps: Vec<Value> = comparison
         .maps
@@ -55,8 +62,12 @@ fn values(comparison: &Comparison, provenance: &Provenance, figures: &mut Figure
     let campaigns: Vec<Value> = comparison
         .campaigns
         .iter()
-        .map(|one| {
+        .enumerate()
+        .map(|(index, one)| {
+            let own = files.get(index);
             context! {
+                circumstances => own.map_or_else(Vec::new, |own| own.circumstances.clone()),
+                links => own.map_or_else(Vec::new, links),
                 id => clean(&one.id),
                 path => clean(&one.path),
                 title => clean(&one.title),
@@ -110,13 +121,26 @@ fn key(of: &Pair, index: usize) -> String {
 }
 
 fn verdict(comparison: &Comparison) -> Vec<String> {
-    let laws = comparison
-        .laws
-        .iter()
-        .flat_map(|law| words::drone_sentences(law).into_iter().chain(words::fleet_sentence(law)));
-    let maps =
-        comparison.maps.iter().filter_map(|map| words::map_sentences(map).into_iter().next());
-    laws.chain(maps).take(MOST_TOLD).collect()
+    let of_law = |law: &LawComparison| {
+        let vehicles = words::other_vehicle(comparison, &law.pair);
+        let mut said = words::drone_sentences(law);
+        said.extend(words::fleet_sentences(law, vehicles.as_deref()));
+        said
+    };
+    let of_map = |map: &MapComparison| words::map_sentences(map).into_iter().next();
+    if comparison.campaigns.len() <= 2 {
+        let laws = comparison.laws.iter().flat_map(of_law);
+        return laws.chain(comparison.maps.iter().filter_map(of_map)).take(MOST_TOLD).collect();
+    }
+    // Of several, each has a paragraph that begins with its name.
+    let of_campaign = |one: &ComparedCampaign| {
+        let is_of = |pair: &Pair| one.flights.contains(&pair.other);
+        let laws = comparison.laws.iter().filter(|law| is_of(&law.pair)).flat_map(of_law);
+        let maps = comparison.maps.iter().filter(|map| is_of(&map.pair)).filter_map(of_map);
+        let said: Vec<String> = laws.chain(maps).collect();
+        (!said.is_empty()).then(|| format!("{}: {}", clean(&one.id), said.join(" ")))
+    };
+    comparison.campaigns.iter().skip(1).filter_map(of_campaign).take(MOST_TOLD).collect()
 }
 
 /// Sentences above everything else; all are below.
@@ -153,17 +177,24 @@ fn tiles(comparison: &Comparison) -> Vec<Value> {
     tiles
 }
 
-fn law_section(law: &LawComparison, index: usize, figures: &mut Figures) -> Value {
+fn law_section(
+    comparison: &Comparison,
+    law: &LawComparison,
+    index: usize,
+    figures: &mut Figures,
+) -> Value {
+    let vehicles = words::other_vehicle(comparison, &law.pair);
     let key = key(&law.pair, index);
     let fleet: Vec<Value> = law
         .fleet
         .iter()
         .map(|one| {
+            let [before, now] = words::before_and_now(one);
             context! {
                 name => words::quantity(one),
                 unit => unit(&one.unit),
-                reference => estimate(one.reference),
-                other => estimate(one.other),
+                reference => before,
+                other => now,
                 change => words::change(one.change),
                 p => words::probability_cell(one.p_value),
             }
@@ -179,7 +210,7 @@ fn law_section(law: &LawComparison, index: usize, figures: &mut Figures) -> Valu
         drones_in_both => count(law.drones_in_both, "drone"),
         sentences => words::drone_sentences(law)
             .into_iter()
-            .chain(words::fleet_sentence(law))
+            .chain(words::fleet_sentences(law, vehicles.as_deref()))
             .chain(words::errors_sentence(law))
             .collect::<Vec<_>>(),
         fleet,
@@ -193,8 +224,8 @@ fn drone_row(law: &LawComparison, one: &DroneChange) -> Value {
         let change = one.changes.iter().find(|change| change.quantity == quantity);
         let beyond = change.and_then(|change| change.beyond_fleet);
         context! {
-            reference => change.map_or_else(|| NONE.to_owned(), |of| estimate(of.reference)),
-            other => change.map_or_else(|| NONE.to_owned(), |of| estimate(of.other)),
+            reference => change.map_or_else(|| NONE.to_owned(), |of| words::value(of.reference)),
+            other => change.map_or_else(|| NONE.to_owned(), |of| words::value(of.other)),
             beyond => beyond.map_or_else(|| NONE.to_owned(), words::change),
             p => words::probability_cell(change.and_then(|change| change.p_value)),
             p_holm => words::probability_cell(change.and_then(|change| change.p_holm)),

@@ -7,7 +7,7 @@ use crate::compare::result::{Comparison, DroneChange, LawComparison, MapComparis
 
 use super::compare_words as words;
 use super::table::{Align, column, lines};
-use super::text::{NONE, clean, estimate, unit};
+use super::text::{NONE, clean, unit};
 
 /// Of more drones, those that changed most are shown; all are in the report.
 const DRONE_LIMIT: usize = 24;
@@ -24,7 +24,7 @@ pub fn comparison_summary(comparison: &Comparison, width: usize, color: bool) ->
     let ids: Vec<String> = comparison.campaigns.iter().map(|one| clean(&one.id)).collect();
     out.line(BOLD, &title(&ids));
     for law in &comparison.laws {
-        out.law(law);
+        out.law(law, words::other_vehicle(comparison, &law.pair).as_deref());
     }
     for map in &comparison.maps {
         out.map(map);
@@ -85,13 +85,13 @@ impl Output {
         }
     }
 
-    fn law(&mut self, law: &LawComparison) {
+    fn law(&mut self, law: &LawComparison, vehicles: Option<&str>) {
         self.line("", "");
         self.line(BOLD, &words::pair(&law.pair));
         for sentence in &words::drone_sentences(law) {
             self.wrapped("", sentence);
         }
-        if let Some(sentence) = &words::fleet_sentence(law) {
+        for sentence in &words::fleet_sentences(law, vehicles) {
             self.wrapped("", sentence);
         }
         if let Some(sentence) = &words::errors_sentence(law) {
@@ -110,10 +110,11 @@ impl Output {
             .fleet
             .iter()
             .map(|one| {
+                let [before, now] = words::before_and_now(one);
                 vec![
                     words::quantity(one),
-                    estimate(one.reference),
-                    estimate(one.other),
+                    before,
+                    now,
                     words::change(one.change),
                     words::probability_cell(one.p_value),
                     unit(&one.unit),
@@ -146,7 +147,7 @@ impl Output {
                     change.map_or_else(|| NONE.to_owned(), words::change)
                 };
                 let hover = of(Quantity::Hover);
-                let value = |of: Option<_>| of.map_or_else(|| NONE.to_owned(), estimate);
+                let value = |of: Option<_>| of.map_or_else(|| NONE.to_owned(), words::value);
                 row.push(value(hover.map(|hover| hover.reference)));
                 row.push(value(hover.map(|hover| hover.other)));
                 row.push(beyond(Quantity::Hover));

@@ -3,14 +3,16 @@
 use crate::base::estimate::Estimate;
 use crate::compare::chance::LEVEL;
 use crate::compare::result::{
-    AllEqual, Basis, Change, Comparison, DroneChange, FleetChange, Identity, LawComparison,
-    MapComparison, MeanComparison, Pair, Quantity, ScaleComparison,
+    AllEqual, Basis, Change, ComparedCampaign, Comparison, DroneChange, FleetChange, Identity,
+    LawComparison, MapComparison, MeanComparison, Pair, Quantity, ScaleComparison,
 };
 
 use super::text::{NONE, clean, count, estimate, fixed, signed, unit, usable};
 
 /// A response that changed by so many errors is told beside a changed hover.
 const TOLD: f64 = 2.0;
+/// Scatter over stated errors that is not told closer.
+const LEAST_SCATTER: f64 = 0.1;
 /// Below this a probability is not printed.
 const LEAST_P: f64 = 1e-4;
 
@@ -34,8 +36,51 @@ pub(super) fn probability_cell(p: Option<f64>) -> String {
 
 /// The value of a change with its sign, and its error: `+14.1 ± 3.0`.
 pub(super) fn change(of: Estimate) -> String {
-    let text = estimate(of);
-    if of.value > 0.0 && usable(of.value) { format!("+{text}") } else { text }
+    let text = value(of);
+    let shown = text.split(' ').next().unwrap_or_default();
+    let is_zero = !shown.chars().any(|c| matches!(c, '1'..='9'));
+    if of.value > 0.0 && usable(of.value) && !is_zero { format!("+{text}") } else { text }
+}
+
+/// A value with its error; without one, with the digits that a reader can use.
+pub(super) fn value(of: Estimate) -> String {
+    let negligible = of.se < 1e-9 * of.value.abs();
+    if usable(of.value) && usable(of.se) && (of.se <= 0.0 || negligible) {
+        let decimals = match of.value.abs() {
+            size if size >= 100.0 => 1,
+            size if size >= 10.0 => 2,
+            _ => 3,
+        };
+        return fixed(of.value, decimals);
+    }
+    estimate(of)
+}
+
+/// The fleet before and now, by the drones in both: the two that the change lies between.
+pub(super) fn before_and_now(of: &FleetChange) -> [String; 2] {
+    let found = of.reference_in_both.zip(of.other_in_both);
+    let (before, now) = found.unwrap_or((of.reference, of.other));
+    // Both with the digits of the one that is known better, so that the change is their difference.
+    let places = [before, now, of.change].iter().filter_map(Estimate::decimals).max();
+    match places.filter(|_| [before, now].iter().all(|one| one.se > 0.0 && usable(one.se))) {
+        Some(places) => [before, now]
+            .map(|one| format!("{} ± {}", fixed(one.value, places), fixed(one.se, places))),
+        None => [before, now].map(value),
+    }
+}
+
+/// Vehicles of a pair's flights where they differ: `tuesday flew x400, monday x300`.
+pub(super) fn other_vehicle(comparison: &Comparison, pair: &Pair) -> Option<String> {
+    let of = |flight: &str| {
+        let is_there = |one: &&ComparedCampaign| one.flights.iter().any(|id| id == flight);
+        comparison.campaigns.iter().find(is_there)
+    };
+    let (reference, other) = (of(&pair.reference)?, of(&pair.other)?);
+    let (was, is) = (reference.vehicle.as_deref()?, other.vehicle.as_deref()?);
+    (was != is).then(|| {
+        let [other, is, reference, was] = [&other.id, is, &reference.id, was].map(clean);
+        format!("{other} flew {is}, {reference} {was}")
+    })
 }
 
 /// The two flights: `tuesday/calibration against monday/calibration`.
@@ -75,30 +120,49 @@ fn of(drone: &DroneChange, quantity: Quantity) -> Option<&Change> {
     drone.changes.iter().find(|change| change.quantity == quantity)
 }
 
-/// What changed of the fleet as a whole.
-pub(super) fn fleet_sentence(law: &LawComparison) -> Option<String> {
-    let hover = law.fleet.iter().find(|change| change.quantity == Quantity::Hover)?;
+/// What changed of the fleet as a whole. `vehicles`: see [`other_vehicle`].
+pub(super) fn fleet_sentences(law: &LawComparison, vehicles: Option<&str>) -> Vec<String> {
+    let of = |quantity| law.fleet.iter().find(|change| change.quantity == quantity);
+    let Some(hover) = of(Quantity::Hover) else { return Vec::new() };
     let effort = unit(&hover.unit);
-    let significance = hover.p_value.is_some_and(|p| p < LEVEL);
-    if hover.p_value.is_none() {
-        return Some(format!(
-            "The fleet as a whole ({} in both) needs {} {effort} in hover; this is not tested, as the errors of this \
-             law leave out slow air that all drones shared.",
-            count(law.drones_in_both, "drone"),
-            change(hover.change)
-        ));
-    }
-    let verdict = if significance {
-        "more than chance: air density, battery, temperature or load of all drones"
-    } else {
-        "no more than the air during the two calibrations and other errors that all drones share"
-    };
-    Some(format!(
-        "The fleet as a whole ({} in both) needs {} {effort} in hover ({}), {verdict}.",
+    let needs = format!(
+        "The fleet as a whole ({} in both) needs {} {effort} in hover",
         count(law.drones_in_both, "drone"),
-        change(hover.change),
-        probability(hover.p_value)
-    ))
+        change(hover.change)
+    );
+    if hover.p_value.is_none() {
+        return vec![format!(
+            "{needs}; this is not tested, as the errors of this law leave out slow air that all drones shared."
+        )];
+    }
+    let is_found = |change: &FleetChange| change.p_value.is_some_and(|p| p < LEVEL);
+    let verdict = match vehicles {
+        Some(vehicles) if is_found(hover) => format!(
+            "more than chance: above all another vehicle ({vehicles}); beside that air density, battery, temperature \
+             or load of all drones"
+        ),
+        None if is_found(hover) => {
+            "more than chance: air density, battery, temperature or load of all drones".to_owned()
+        }
+        _ => "no more than the air during the two calibrations and other errors that all drones share"
+            .to_owned(),
+    };
+    let mut said = vec![format!("{needs} ({}), {verdict}.", probability(hover.p_value))];
+    said.extend(of(Quantity::Response).filter(|response| is_found(response)).map(|response| {
+        let more = if response.change.value > 0.0 { "more strongly" } else { "more weakly" };
+        let size = Estimate::new(response.change.value.abs(), response.change.se);
+        let cause = match vehicles {
+            Some(vehicles) => format!("above all another vehicle ({vehicles})"),
+            None => "air density, battery, or motors and propellers of all drones".to_owned(),
+        };
+        format!(
+            "It responds {more} to vertical speed by {} {} ({}), more than chance: {cause}.",
+            value(size),
+            unit(&response.unit),
+            probability(response.p_value)
+        )
+    }));
+    said
 }
 
 /// The drones that changed, a sentence each; one sentence where none did.
@@ -136,7 +200,7 @@ fn sentence(law: &LawComparison, one: &DroneChange) -> String {
     let effort = unit(&law.effort_unit);
     let (hover, response) = (of(one, Quantity::Hover), of(one, Quantity::Response));
     let t = |change: Option<&Change>| change.and_then(|change| change.t).unwrap_or_default();
-    let size = |of: Estimate| estimate(Estimate::new(of.value.abs(), of.se));
+    let size = |of: Estimate| value(Estimate::new(of.value.abs(), of.se));
     if let Some((found, beyond)) = significant(hover).and_then(|of| Some((of, of.beyond_fleet?))) {
         let more = if beyond.value > 0.0 { "more" } else { "less" };
         let cause = match (beyond.value > 0.0, t(response)) {
@@ -170,19 +234,21 @@ fn sentence(law: &LawComparison, one: &DroneChange) -> String {
 /// Where the errors of the drones come from.
 pub(super) fn errors_sentence(law: &LawComparison) -> Option<String> {
     let scatter = law.fleet.iter().find(|change| change.quantity == Quantity::Hover)?.scatter?;
+    let times = if scatter < LEAST_SCATTER {
+        format!("less than {} times", fixed(LEAST_SCATTER, 1))
+    } else {
+        format!("{} times", fixed(scatter, usize::from(scatter < 10.0)))
+    };
     Some(match law.basis {
         Basis::Stated if scatter > 1.0 => format!(
-            "The drones' changes in hover scatter by {} times their stated errors, which are widened by that.",
-            fixed(scatter, 2)
+            "The drones' changes in hover scatter by {times} their stated errors, which are widened by that."
         ),
         Basis::Stated => format!(
-            "The drones' changes in hover scatter by {} times their stated errors, which are kept.",
-            fixed(scatter, 2)
+            "The drones' changes in hover scatter by {times} their stated errors, which are kept."
         ),
         Basis::Scatter => format!(
-            "The errors of this law hold air that all drones shared: the scatter of the fleet stands for them ({} \
-             times as large).",
-            fixed(scatter, 2)
+            "The errors of this law hold air that all drones shared: the scatter of the fleet stands for them ({times} \
+             as large)."
         ),
     })
 }
@@ -250,11 +316,23 @@ pub(super) fn map_sentences(map: &MapComparison) -> Vec<String> {
         sentences.push(if differ.is_empty() {
             "Strength and scales of the air differ by no more than chance.".to_owned()
         } else {
-            let names: Vec<String> = differ.iter().map(|row| clean(&row.name)).collect();
-            format!("Of strength and scales of the air differ: {}.", names.join(", "))
+            let labels: Vec<String> = differ.iter().map(|row| clean(&row.name)).collect();
+            let verb = if labels.len() == 1 { "differs" } else { "differ" };
+            format!(
+                "Of the strength and the scales of the air, {} {verb} by more than chance.",
+                and_joined(&labels)
+            )
         });
     }
     sentences
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn and_joined(words: &[String]) -> String {
+    match words {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => words.concat(),
+    }
 }
 
 /// Whether a scale differs by more than chance.
@@ -297,7 +375,10 @@ pub(super) fn equal_sentences(comparison: &Comparison) -> Vec<String> {
         sentences.push(if differ.is_empty() {
             "Against the fleet, no drone's effort in hover differs between the flights beyond chance.".to_owned()
         } else {
-            format!("Against the fleet, the effort in hover differs between the flights: {}.", differ.join(", "))
+            format!(
+                "Against the fleet, the effort in hover differs between the flights by more than chance for: {}.",
+                differ.join(", ")
+            )
         });
     }
     sentences
@@ -327,6 +408,8 @@ mod tests {
             reference: nothing,
             other: nothing,
             change: Estimate::new(-4.0, 10.0),
+            reference_in_both: None,
+            other_in_both: None,
             z: Some(-0.4),
             p_value: Some(0.69),
             scatter: Some(1.3),
@@ -377,8 +460,33 @@ mod tests {
 
     #[test]
     fn the_fleet_is_told_with_the_errors_that_all_share() {
-        let sentence = fleet_sentence(&law(&[(Quantity::Hover, 4.2, 3.1, 0.7)])).unwrap();
-        assert!(sentence.starts_with("The fleet as a whole (25 drones in both) needs −4 ± 10 µs in hover (p = 0.69), no more"), "{sentence}");
+        let mut one = law(&[(Quantity::Hover, 4.2, 3.1, 0.7)]);
+        let said = fleet_sentences(&one, None);
+        assert_eq!(said.len(), 1, "the response is no more than chance");
+        assert!(said[0].starts_with("The fleet as a whole (25 drones in both) needs −4 ± 10 µs in hover (p = 0.69), no more"), "{said:?}");
+        one.fleet[1].p_value = Some(0.04);
+        assert!(fleet_sentences(&one, None)[1].contains("(p = 0.04), more than chance"));
+        one.fleet[0].p_value = Some(0.001);
+        let said = fleet_sentences(&one, Some("b flew heavy, a light"));
+        assert!(said[0].contains("above all another vehicle (b flew heavy, a light)"), "{said:?}");
+    }
+
+    #[test]
+    fn a_change_has_no_sign_before_zero_and_no_digits_that_nobody_needs() {
+        assert_eq!(change(Estimate::new(0.2, 14.0)), "0 ± 14");
+        assert_eq!(change(Estimate::new(-0.3, 16.0)), "0 ± 16");
+        assert_eq!(change(Estimate::new(-0.02, 1.9)), "0.0 ± 1.9");
+        assert_eq!(change(Estimate::new(14.1, 3.0)), "+14.1 ± 3.0");
+        assert_eq!(value(Estimate::new(1541.56, 0.0)), "1541.6");
+    }
+
+    #[test]
+    fn before_and_now_differ_by_the_change() {
+        let mut fleet = law(&[]).fleet.remove(0);
+        fleet.change = Estimate::new(1.0, 12.0);
+        fleet.reference_in_both = Some(Estimate::new(1540.6, 9.0));
+        fleet.other_in_both = Some(Estimate::new(1541.6, 9.0));
+        assert_eq!(before_and_now(&fleet), ["1540.6 ± 9.0", "1541.6 ± 9.0"]);
     }
 
     #[test]

@@ -7,11 +7,9 @@ use crate::analysis::law::LawOf;
 use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap};
 use crate::numeric::Sorted;
 
+use super::doubts::doubts;
 use super::fleet_air::fleet_air;
-use super::text::{NONE, clean, count, fixed, shortened, signed, usable};
-
-/// Most rows of the table of quality.
-const MOST_FLAGS: usize = 400;
+use super::text::{NONE, count, fixed, signed, usable};
 
 /// A kind of error: its name, what it is, and where it stands in the drone's and the common budget.
 type BudgetRow =
@@ -69,7 +67,7 @@ pub(super) fn section(map: &UpdraftMap) -> Value {
             percent(truth.means_inside_share),
         )
     });
-    context! { budget => budget(map), truth, quality => quality(map), coverage => coverage(map) }
+    context! { budget => budget(map), truth, quality => doubts(map), coverage => coverage(map) }
 }
 
 fn budget(map: &UpdraftMap) -> Option<Value> {
@@ -105,25 +103,6 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
         fleet => drones.len() > 1,
         half_width => half_width.map(|common| fixed(common.half_width_mps, 2)),
     })
-}
-
-/// One row for each doubtful stretch.
-fn quality(map: &UpdraftMap) -> Value {
-    let all = || map.drones.iter().flat_map(|d| d.quality.iter().map(move |flag| (d, flag)));
-    let rows: Vec<Value> = all()
-        .take(MOST_FLAGS)
-        .map(|(drone, flag)| {
-            context! {
-                drone => shortened(&drone.name, 28),
-                flag => flag.flag.words(),
-                excluded => flag.flag.excludes(),
-                from => fixed(flag.start_s, 0),
-                to => fixed(flag.end_s, 0),
-                reason => clean(&flag.reason),
-            }
-        })
-        .collect();
-    context! { left_out => all().count().saturating_sub(MOST_FLAGS), rows }
 }
 
 /// `49 drones have a value in 99.8 % of 590 s`.

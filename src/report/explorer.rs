@@ -184,6 +184,7 @@ pub(super) fn explorer(
         key,
         air => data.air.is_some(),
         tracks => data.tracks.is_some(),
+        replay => data.tracks.is_some() && tracks.iter().any(Track::has_place),
         posterior => map.is_some_and(|map| map.posterior.is_some()),
         banded,
         truth => film && frames.is_some_and(|frames| frames.truth_known),

@@ -16,9 +16,11 @@ mod cite;
 mod colour;
 mod compare;
 mod compare_page;
+mod compare_sides;
 mod compare_terminal;
 mod compare_words;
 mod delta;
+mod doubts;
 mod drone_table;
 mod errors;
 mod explorer;
@@ -67,6 +69,7 @@ mod table;
 mod terminal;
 mod text;
 mod tracks;
+mod typographic;
 mod vendor;
 
 use std::path::Path;
@@ -79,6 +82,7 @@ use crate::study::result::StudyResult;
 
 pub use basemap::{Basemap, BasemapError, Corners, MOST_BASEMAP_BYTES};
 pub use compare_page::render_comparison;
+pub use compare_sides::{ComparedFiles, where_and_when};
 pub use compare_terminal::comparison_summary;
 pub use gap_page::render_gap;
 pub use gap_terminal::gap_summary;

@@ -31,6 +31,7 @@ use super::notes::{
 };
 use super::page::{Gallery, capitalised, flight_key};
 use super::text::{clean, kind, purpose, signed};
+use super::typographic::typographic;
 
 /// Bytes of drawings of single drones that the page carries, before they are compressed to a sixth; further drones are
 /// only in files.
@@ -118,7 +119,7 @@ pub(super) fn flight_section(
         nothing => nothing(flight),
         table_heading => table_heading(flight),
         scatter => law::flight_laws(flight).and_then(scatter_line),
-        cautions => flight.warnings.iter().map(|w| clean(&w.to_string())).collect::<Vec<_>>(),
+        cautions => flight.warnings.iter().map(|w| typographic(&w.to_string())).collect::<Vec<_>>(),
         wind => flight.map.as_ref().and_then(|map| map.wind).map_or("", |wind| match wind {
             WindCorrection::Drag => "drag",
             WindCorrection::Physics => "physics",

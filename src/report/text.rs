@@ -97,10 +97,8 @@ fn value_and_error(of: Estimate) -> (String, Option<String>) {
     // An error in the last bits of a double is none.
     let negligible = of.se < 1e-9 * of.value.abs();
     match of.decimals().filter(|_| !negligible) {
-        Some(decimals) => {
-            (minus(&format!("{:.decimals$}", of.value)), Some(format!("{:.decimals$}", of.se)))
-        }
-        None => (minus(&format!("{:.3}", of.value)), None),
+        Some(decimals) => (fixed(of.value, decimals), Some(format!("{:.decimals$}", of.se))),
+        None => (fixed(of.value, 3), None),
     }
 }
 

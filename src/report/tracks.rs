@@ -59,6 +59,18 @@ pub(super) struct Track {
     pub(super) effort: Vec<Option<f64>>,
 }
 
+impl Track {
+    /// Whether it is known where the drone was, at any time.
+    pub(super) fn has_place(&self) -> bool {
+        let [forward, left, up] = &self.place_m;
+        forward
+            .iter()
+            .zip(left)
+            .zip(up)
+            .any(|((x, y), z)| x.is_some() && y.is_some() && z.is_some())
+    }
+}
+
 /// The drone's track; where its log says nothing of its place, it is above its home.
 pub(super) fn track(flight: &FlightAnalysis, drone: &DroneAnalysis, times: Times) -> Track {
     let trace = &drone.trace;

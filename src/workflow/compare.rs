@@ -1,6 +1,7 @@
 //! Comparison of campaigns: their analyses and records are read, compared and written.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
@@ -21,7 +22,7 @@ use crate::campaign::{self, CampaignError, FlightFolder, is_campaign, to_json};
 use crate::compare::result::Comparison;
 use crate::compare::{FlightFacts, LawChoice, Side, compare};
 use crate::fleet::slots::FleetTable;
-use crate::report::{self, InputFile, Provenance};
+use crate::report::{self, ComparedFiles, InputFile, PageLink, Provenance};
 
 /// File of the numbers, in the folder of a comparison.
 pub const RESULT_FILE: &str = "compare.json";
@@ -83,7 +84,7 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
             inputs,
             ..Provenance::default()
         };
-        write(host, &comparison, &provenance, output)
+        write(host, &comparison, (&sides, &request.paths), &provenance, output)
     });
     let ending = Ending::of_losses(!comparison.not_compared.is_empty());
     Ok(Compared { page: page.transpose()?, comparison, ending })
@@ -92,17 +93,66 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
 fn write(
     host: &dyn Host,
     comparison: &Comparison,
+    (sides, paths): (&[Side], &[PathBuf]),
     provenance: &Provenance,
     output: &Path,
 ) -> Result<PathBuf, WorkflowError> {
     let _lock = host.lock(output)?;
     let json = to_json(comparison)
         .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
-    let made = report::render_comparison(comparison, provenance)?;
     let folder = output.join("report");
+    let files: Vec<ComparedFiles> =
+        sides.iter().zip(paths).map(|(side, path)| files_of(side, path, output)).collect();
+    let made = report::render_comparison(comparison, provenance, &files)?;
     write_whole(&output.join(RESULT_FILE), &json)?;
     report::write(&made, &folder)?;
     Ok(folder.join(report::PAGE_FILE))
+}
+
+/// Where and when a campaign was flown, and links to its report and analysis as far as they are there.
+fn files_of(side: &Side, path: &Path, output: &Path) -> ComparedFiles {
+    let analysis = analysis_of(path);
+    let page = analysis.parent().map(|folder| folder.join("report").join(report::PAGE_FILE));
+    let links = [("report", page), ("analysis.json", Some(analysis))];
+    let link = |(title, file): (&str, Option<PathBuf>)| {
+        Some(PageLink::there(title, way(output, &file.filter(|file| file.is_file())?)?))
+    };
+    ComparedFiles {
+        links: links.into_iter().filter_map(link).collect(),
+        circumstances: report::where_and_when(&side.analysis),
+    }
+}
+
+/// Address of a file as seen from the report in a folder; `None`: no relative one leads there.
+fn way(output: &Path, file: &Path) -> Option<String> {
+    let (output, file) = (output.canonicalize().ok()?, file.canonicalize().ok()?);
+    let page = output.join("report");
+    let common = page.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    // On another drive.
+    if common == 0 {
+        return None;
+    }
+    let up = page.components().skip(common).map(|_| "..".to_owned());
+    let down =
+        file.components().skip(common).map(|part| escaped(&part.as_os_str().to_string_lossy()));
+    Some(up.chain(down).collect::<Vec<_>>().join("/"))
+}
+
+/// A part of a path as an address has it.
+fn escaped(part: &str) -> String {
+    let mut out = String::new();
+    for byte in part.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => {
+                out.push(char::from(byte));
+            }
+            _ => {
+                // A string takes everything.
+                let _ = write!(out, "%{byte:02X}");
+            }
+        }
+    }
+    out
 }
 
 /// A page of one campaign must not be replaced by one of several.
@@ -237,6 +287,18 @@ fn facts_of(flight: &FlightAnalysis, folder: &FlightFolder) -> FlightFacts {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn links_lead_from_the_page_to_a_campaign_beside_it() {
+        let room = tempfile::tempdir().unwrap();
+        let (output, campaign) = (room.path().join("week"), room.path().join("mon day#1"));
+        std::fs::create_dir_all(&output).unwrap();
+        std::fs::create_dir_all(&campaign).unwrap();
+        let file = campaign.join("analysis.json");
+        std::fs::write(&file, "{}").unwrap();
+        assert_eq!(way(&output, &file).unwrap(), "../../mon%20day%231/analysis.json");
+        assert_eq!(way(&output, &campaign.join("none")), None);
+    }
 
     #[test]
     fn other_formats_are_refused_by_their_name() {

@@ -307,7 +307,7 @@ for (const film of document.querySelectorAll(".film")) {
     }
     const all = Array.from(shown.estimate.subarray(at, at + drones)).filter((w) => w !== NONE);
     const mean = all.length ? all.reduce((a, b) => a + b, 0) / all.length : NONE;
-    let text = `${shown === posterior ? "posterior " : ""}mean of ${all.length} drones ${signed(mean)}`;
+    let text = `${shown === posterior ? "posterior " : ""}mean of ${updraft.drones(all.length)} ${signed(mean)}`;
     if (shown.difference) {
       const off = Array.from(shown.difference.subarray(at, at + drones)).filter((w) => w !== NONE);
       const rms = Math.sqrt(off.reduce((a, b) => a + b * b, 0) / Math.max(1, off.length));

@@ -48,7 +48,10 @@ for (const replay of document.querySelectorAll(".replay")) {
     const ground = [0, 1].map((axis) => [Math.floor(reach[axis][0] / cell - 0.5) * cell, Math.ceil(reach[axis][1] / cell + 0.5) * cell]);
     const top = Math.max(reach[2][1], cell);
     const centre = [(ground[0][0] + ground[0][1]) / 2, (ground[1][0] + ground[1][1]) / 2, top / 2];
-    const around = Math.hypot(ground[0][1] - centre[0], ground[1][1] - centre[1]);
+    // The arrow to the north begins where the ground ends, and its sign lies ahead of it.
+    const halves = [ground[0][1] - centre[0], ground[1][1] - centre[1]];
+    const edge = Math.min(halves[0] / Math.max(1e-9, Math.abs(Math.cos(north))), halves[1] / Math.max(1e-9, Math.abs(Math.sin(north))));
+    const around = Math.max(Math.hypot(...halves), edge + 1.9 * cell);
     replay.querySelector(".cell").textContent = `${cell} m`;
 
     // A picture of the ground, if the map has one.
@@ -117,10 +120,9 @@ for (const replay of document.querySelectorAll(".replay")) {
       pen.stroke();
       // North, beside the ground.
       const middle = [centre[0], centre[1]];
-      const size = Math.hypot(front - back, left - right) / 2;
       const ahead = [Math.cos(north), Math.sin(north)];
       const at = (along, aside) => [middle[0] + ahead[0] * along - ahead[1] * aside, middle[1] + ahead[1] * along + ahead[0] * aside, 0];
-      const [tail, tip] = [1.02 * size, 1.02 * size + 1.2 * cell];
+      const [tail, tip] = [edge + 0.2 * cell, edge + 1.1 * cell];
       pen.strokeStyle = pen.fillStyle = ink.muted;
       pen.lineWidth = 1.5;
       pen.beginPath();
@@ -128,7 +130,7 @@ for (const replay of document.querySelectorAll(".replay")) {
       line(pen, at(tip, 0), at(tip - 0.4 * cell, 0.25 * cell));
       line(pen, at(tip, 0), at(tip - 0.4 * cell, -0.25 * cell));
       pen.stroke();
-      const sign = at(tip + 0.6 * cell, 0);
+      const sign = at(tip + 0.5 * cell, 0);
       pen.textAlign = "center";
       pen.fillText("N", view.x(sign[0], sign[1]), view.y(...sign) + 4);
       // Heights, at the corner that is farthest to the left.
@@ -140,7 +142,8 @@ for (const replay of document.querySelectorAll(".replay")) {
         pen.stroke();
         pen.textAlign = "right";
         const step = nice(top / 5);
-        for (let z = 0; z <= top + 1e-6; z += step) pen.fillText(`${z} m`, view.x(...foot) - 6, view.y(...foot, z) + 4);
+        const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+        for (let i = 0; i * step <= top + 1e-6; i++) pen.fillText(`${(i * step).toFixed(digits)} m`, view.x(...foot) - 6, view.y(...foot, i * step) + 4);
       }
     };
     const drawTrails = (pen, ink) => {
@@ -194,6 +197,8 @@ for (const replay of document.querySelectorAll(".replay")) {
         markers.push({ i, place, at: [view.x(place[0], place[1]), view.y(...place)], depth: view.depth(...place), value: valueOf(i, now) });
       }
       markers.sort((a, b) => b.depth - a.depth);
+      // What shows nothing but drones on the ground is not printed.
+      replay.classList.toggle("grounded", !markers.some((one) => one.place[2] > 1));
       const size = count > 400 ? 2.5 : count > 100 ? 3.5 : 5;
       for (const one of markers) {
         const [x, y] = one.at;
@@ -232,7 +237,7 @@ for (const replay of document.querySelectorAll(".replay")) {
       const i = flight.picks.indexOf(updraft.picked);
       const values = markers.map((one) => one.value).filter((v) => v !== null);
       const mean = values.length ? values.reduce((a, b) => a + b, 0) / values.length : null;
-      let text = `mean of ${values.length} drones: ${words(mean)}`;
+      let text = `mean of ${updraft.drones(values.length)}: ${words(mean)}`;
       if (i >= 0) {
         const place = placeOf(i, now);
         const height = place && place[2] !== null ? `, ${place[2].toFixed(1).replace("-", "−")} m above its home` : "";

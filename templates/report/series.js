@@ -195,7 +195,7 @@ for (const chart of document.querySelectorAll(".series")) {
         legend: { show: false },
         cursor: { y: false, points: { show: false }, drag: { x: true, y: false, dist: 5 } },
         scales: { x: { time: false }, y: { auto: false } },
-        axes: [axis({ label: "show time (s)", size: 34 }), axis({ size: 56 })],
+        axes: [axis({ label: "show time (s)", size: 34 }), axis({ size: 56, label: () => `${choice.selectedOptions[0].textContent.replace(/ \(.*/, "")} (${shown.unit})` })],
         series: [{}, { stroke: () => ink("ink"), width: 1.5, points: { show: false } }],
         hooks: {
           drawAxes: [crowd],
@@ -248,7 +248,7 @@ for (const chart of document.querySelectorAll(".series")) {
       const time = hovered >= 0 ? shown.times[plot.cursor.idx] : now;
       const t = updraft.before(shown.times, time);
       const all = t < 0 ? [] : known(t);
-      const fleet = all.length ? `mean of ${all.length} drones ${said(shown.mean[t])}` : "no values";
+      const fleet = all.length ? `mean of ${updraft.drones(all.length)} ${said(shown.mean[t])}` : "no values";
       let words = "";
       if (i >= 0) {
         const drone = updraft.drone(key, i);

@@ -194,6 +194,8 @@ const updraft = (() => {
       const text = Math.abs(value).toFixed(digits);
       return (Number(text) === 0 ? "" : value < 0 ? "−" : "+") + text;
     },
+    // 1 drone, 2 drones.
+    drones: (n) => `${n} ${n === 1 ? "drone" : "drones"}`,
     // Colours of the page, light or dark.
     ink: (element, name) => getComputedStyle(element).getPropertyValue("--" + name).trim() || "#888",
     // Begins with a part when it is near the window, or printed.

@@ -174,7 +174,9 @@ fn truth_panel(map: &UpdraftMap) -> Option<Panel> {
     if marks.is_empty() {
         return None;
     }
-    let values = || marks.iter().flat_map(|mark| [mark.x, mark.y]);
+    // The error bars, too, lie within the frame.
+    let ends = |mark: &Mark| [mark.x - mark.x_error, mark.x + mark.x_error, mark.y];
+    let values = || marks.iter().flat_map(ends);
     let x = Axis::around("estimated W* (m/s)", values(), 0.1);
     let y = Axis::around("true W (m/s)", values(), 0.1);
     let mut panel = Panel::new("(b) Estimated and true", x.clone(), y);
