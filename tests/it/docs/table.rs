@@ -95,6 +95,7 @@ pub(crate) const RULES: &[Rule] = &[
     rule("README.md", "updraft compare", Read(TWO)),
     rule("docs/compare.md", "updraft compare", Read(TWO)),
     rule("docs/basemap.md", "updraft analyze", Read("needs a picture: tests/it/cli/basemap.rs")),
+    rule("docs/report.md", "updraft analyze", Read("draws all figures: tests/it/cli/paper.rs")),
     rule("README.md", "updraft inspect FILE", Instead("FILE", "my-campaign/show.skyc")),
     rule("README.md", "updraft fly my-campaign", With(&["--dry-run"])),
     rule("README.md", "updraft logs pull", With(&["--dry-run"])),
