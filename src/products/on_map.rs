@@ -210,15 +210,16 @@ mod tests {
 
     #[test]
     fn a_thinned_track_keeps_its_corners_and_nothing_between_them() {
-        // Up 100 m, 111 m to the north, and down again.
+        // Up 100 m, 111 m to the north, down again, and up by 40 m.
         let up = (0..=100).map(|step| place(47.0, f64::from(step)));
         let across = (1..=100).map(|step| place(47.0 + 1e-5 * f64::from(step), 100.0));
         let down = (1..=100).map(|step| place(47.001, 100.0 - f64::from(step)));
-        let track: Vec<Place> = up.chain(across).chain(down).collect();
-        let corners =
-            [place(47.0, 0.0), place(47.0, 100.0), place(47.001, 100.0), place(47.001, 0.0)];
+        let again = (1..=40).map(|step| place(47.001, f64::from(step)));
+        let track: Vec<Place> = up.chain(across).chain(down).chain(again).collect();
+        let corners = [(47.0, 0.0), (47.0, 100.0), (47.001, 100.0), (47.001, 0.0), (47.001, 40.0)]
+            .map(|(lat_deg, height_m)| place(lat_deg, height_m));
         let found = thinned(&track);
-        assert_eq!(found.len(), 4, "{found:?}");
+        assert_eq!(found.len(), corners.len(), "{found:?}");
         for (found, corner) in found.iter().zip(corners) {
             assert!((found.lat_lon_deg[0] - corner.lat_lon_deg[0]).abs() < 1e-9);
             assert_eq!(found.height_m, corner.height_m);

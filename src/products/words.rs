@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn times_are_written_as_iso_8601_has_them() {
         assert_eq!(iso(0), "1970-01-01T00:00:00.000Z");
-        assert_eq!(iso(1_795_143_537_250), "2026-11-20T01:38:57.250Z");
+        assert_eq!(iso(1_795_143_537_250), "2026-11-20T02:58:57.250Z");
         assert_eq!(iso(-1), "1969-12-31T23:59:59.999Z");
     }
 }
