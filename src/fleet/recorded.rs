@@ -21,7 +21,7 @@ pub struct Recorded {
     pub unix_us: u64,
     /// Drone that it is about; absent: the station, or all drones.
     pub drone: Option<DroneId>,
-    /// Entry's content.
+    /// Event or step that the entry tells of.
     pub happened: Happened,
 }
 

@@ -11,10 +11,10 @@ use super::text::clean;
 /// Most flights whose time is told.
 const MOST_FLIGHTS: usize = 4;
 
-/// What a comparison tells of a campaign beside its numbers.
+/// Place, time and files of a compared campaign, which stand beside its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ComparedFiles {
-    /// Its files, as links from the folder of the page.
+    /// Files of the campaign, as links from the folder of the page.
     pub links: Vec<PageLink>,
     /// Where and when it was flown, a line each.
     pub circumstances: Vec<String>,

@@ -15,7 +15,7 @@ use crate::spectrum::{Band, slope};
 pub const C1: f64 = 0.49;
 /// Constant of the structure function along the wind.
 pub const C2: f64 = 1.97;
-/// What a component across the wind has more.
+/// Ratio of a component across the wind to the one along it.
 pub const ACROSS: f64 = 4.0 / 3.0;
 /// Slope of the inertial range.
 pub const SLOPE: f64 = -5.0 / 3.0;
@@ -83,9 +83,9 @@ pub enum NoRange {
     TooNarrow,
     /// The slope is none of an inertial range.
     Slope {
-        /// Slope.
+        /// Slope of the logarithm of density over that of frequency.
         slope: f64,
-        /// Its standard error.
+        /// Standard error of the slope.
         se: f64,
     },
     /// The wind carries nothing past.

@@ -17,7 +17,7 @@ const FASTEST_MPS: f64 = 40.0;
 pub struct At<'a> {
     /// Place, m: east and north (or any two axes, in which advection is told then).
     pub place_m: [f64; 2],
-    /// Record.
+    /// Record at this place.
     pub record: &'a Record,
 }
 

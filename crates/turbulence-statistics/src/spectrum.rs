@@ -24,7 +24,7 @@ const CORRELATION: [f64; 2] = [4.0 / 9.0, 1.0 / 36.0];
 /// Bands are told up to the frequency at which the instrument still measures this share of the variance.
 pub const SHARE: f64 = 0.5;
 
-/// What is known of the instrument.
+/// Response, noise and scale of an instrument.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Instrument {
     /// Response, which spectra are divided by.

@@ -1,5 +1,5 @@
-//! What the journal of a flight adds to its replay: what the station heard and did, and when. Of drones whose logs are
-//! not here it is all there is.
+//! The journal of a flight in its replay: what the station heard and did, and when. Of drones whose logs are not here
+//! it is all there is.
 
 use std::collections::BTreeMap;
 
