@@ -297,7 +297,7 @@ mod tests {
         let found = wind(&leaning(90.0), false);
         let [east, north] = found.east_north_mps[0].unwrap();
         assert!((east + 8.0).abs() < 0.02 && (north - 6.0).abs() < 0.02, "{east} {north}");
-        // U = 38.2 sqrt(tangent): 0.2 degrees of trim are 0.318 m/s of 8 and 0.424 m/s of 6; the drag is known to 8 %.
+        // U = 38.2 sqrt(tangent): 0.2 degrees of trim are 0.32 m/s of 8 and 0.424 m/s of 6; the drag is known to 8 %.
         let [se_east, se_north] = found.se_mps[0].unwrap();
         assert!((se_east - f64::hypot(0.32, 0.64)).abs() < 0.002, "{se_east}");
         assert!((se_north - f64::hypot(0.424, 0.48)).abs() < 0.002, "{se_north}");
