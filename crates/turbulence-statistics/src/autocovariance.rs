@@ -8,8 +8,11 @@ pub fn cross(a: &Record, b: &Record, lags: usize) -> Vec<f64> {
     if (a.step_s() - b.step_s()).abs() > 1e-9 * a.step_s() {
         return vec![f64::NAN; lags + 1];
     }
-    let (a, b) = (a.anomalies(), b.anomalies());
-    let (a, b) = (a.values(), b.values());
+    products(a.anomalies().values(), b.anomalies().values(), lags)
+}
+
+/// Mean products of values with later ones, by lag; NaN where no pair is known.
+pub(crate) fn products(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     let at = |lag: usize| {
         let later = b.get(lag..).unwrap_or_default();
         let (mut sum, mut count) = (0.0, 0usize);

@@ -1,7 +1,7 @@
 //! Variances, covariances and skewness of records, with random and systematic errors.
 
 use crate::Record;
-use crate::autocovariance::{Exponential, auto, cross, first_lost, share_in_mean};
+use crate::autocovariance::{Exponential, first_lost, products, share_in_mean};
 use crate::quantile::{WIDTH, of_variance, scaled};
 
 /// Lags that enter errors reach to this share of a record.
@@ -28,30 +28,131 @@ pub struct Moment {
     pub time_s: f64,
 }
 
-/// Known lags of a record, for errors.
-fn lags_of(record: &Record) -> usize {
-    (LAGS_SHARE * record.len() as f64) as usize
+/// A record with its autocovariance, which all of its moments and pairs ask for.
+pub(crate) struct Known {
+    step_s: f64,
+    /// NaN in gaps.
+    anomalies: Vec<f64>,
+    count: usize,
+    /// Autocovariance with noise, at the lags that enter errors.
+    lags: Vec<f64>,
 }
 
-fn length_s(record: &Record) -> f64 {
-    record.count() as f64 * record.step_s()
+impl Known {
+    /// `None` of a record with too few values.
+    pub(crate) fn of(record: &Record) -> Option<Self> {
+        let count = record.count();
+        if count < FEWEST {
+            return None;
+        }
+        let anomalies = record.anomalies().values().to_vec();
+        let most = (LAGS_SHARE * record.len() as f64) as usize;
+        let lags = products(&anomalies, &anomalies, most);
+        Some(Self { step_s: record.step_s(), anomalies, count, lags })
+    }
+
+    fn length_s(&self) -> f64 {
+        self.count as f64 * self.step_s
+    }
+
+    /// Autocovariance of the air alone, until it is lost, and the exponential that it follows.
+    fn of_air(&self, noise: f64) -> (Vec<f64>, Option<Exponential>) {
+        let mut lags = self.lags.clone();
+        lags[0] -= noise;
+        let fitted = Exponential::fit(&lags, self.step_s, self.length_s(), 1);
+        let taken = fitted.map_or(0.0, |fitted| fitted.in_mean * fitted.variance);
+        let end = first_lost(&lags).unwrap_or(lags.len());
+        lags.truncate(end.max(1));
+        for value in &mut lags {
+            *value += taken;
+        }
+        (lags, fitted)
+    }
+
+    fn variance(&self, noise: f64, scale_se: f64) -> Moment {
+        let (lags, fitted) = self.of_air(noise);
+        let value = lags[0].max(0.0);
+        let taken = fitted.map_or(0.0, |fitted| fitted.in_mean * fitted.variance);
+        // Noise is in the scatter of what was measured, too.
+        let measured = |lag: usize| lags[lag] + if lag == 0 { noise } else { 0.0 };
+        let mut random2 = 2.0 * of_mean(self.count as f64, lags.len(), |lag| measured(lag).powi(2));
+        if let Some(fitted) = fitted {
+            // Where one realisation happens to be lost early, its exponential goes on: a record that knows only few
+            // eddies must not believe in many.
+            let model = expected(fitted.time_s, self.length_s()).variance;
+            random2 = random2.max((model * value).powi(2));
+        }
+        // What the mean takes away varies as a variance with one degree of freedom.
+        random2 += 2.0 * taken.powi(2);
+        let time_s = fitted.map_or(0.0, |fitted| fitted.time_s);
+        Moment::of_variance(value, random2.sqrt(), scale_se, (taken, time_s))
+    }
+
+    /// Covariances with later parts of another and of another with later parts of this, up to so many lags.
+    pub(crate) fn with(&self, other: &Self, lags: usize) -> [Vec<f64>; 2] {
+        let (a, b) = (&self.anomalies, &other.anomalies);
+        [products(a, b, lags), products(b, a, lags)]
+    }
+
+    /// Covariance with another at lag 0, and by lag as [`Known::with`] has them, up to `lags` or as many as errors need.
+    pub(crate) fn covariance(
+        &self,
+        other: &Self,
+        lags: usize,
+        scale_se: f64,
+    ) -> Option<(Moment, [Vec<f64>; 2])> {
+        let pairs = self.anomalies.iter().zip(&other.anomalies);
+        let both = pairs.filter(|(a, b)| !(*a * *b).is_nan()).count();
+        if both < FEWEST || (self.step_s - other.step_s).abs() > 1e-9 * self.step_s {
+            return None;
+        }
+        let end = |of: &Self| first_lost(&of.lags).unwrap_or(of.lags.len());
+        let until = end(self).min(end(other)).max(1);
+        let [later, earlier] = self.with(other, lags.max(until - 1));
+        let value = later[0];
+        let product = |lag: usize| self.lags[lag] * other.lags[lag] + later[lag] * earlier[lag];
+        let random2 = of_mean(both as f64, until, product).max(0.0);
+        let fitted = Exponential::fit(&self.lags, self.step_s, self.length_s(), 1);
+        let time_s = fitted.map_or(0.0, |fitted| fitted.time_s);
+        // The two means take of the covariance what each takes of its variance.
+        let share = fitted.map_or(0.0, |fitted| fitted.in_mean).min(0.5);
+        let systematic = value * share / (1.0 - share);
+        let value = value + systematic;
+        let random = random2.sqrt() / (1.0 - share);
+        let width = WIDTH * random.hypot(value * scale_se);
+        let (low, high) = (value - width, value + width);
+        Some((Moment { value, low, high, random, systematic, time_s }, [later, earlier]))
+    }
+
+    /// Covariance of the variances of two records: `2/n` times the sum of their squared covariance over lags of either
+    /// sign, less what the estimates of that scatter by.
+    fn shared(&self, other: &Self, lags: usize) -> f64 {
+        let count = self.count.min(other.count) as f64;
+        let [later, earlier] = self.with(other, lags);
+        let lags = lags.min(self.lags.len()).min(other.lags.len());
+        let scatter = of_mean(count, lags, |lag| self.lags[lag] * other.lags[lag]);
+        let both = later.iter().chain(earlier.iter().skip(1));
+        let known = both.filter(|value| !value.is_nan());
+        2.0 * known.map(|value| value.powi(2) - scatter).sum::<f64>() / count
+    }
 }
 
-/// Autocovariance of the air alone, until it is lost, and the exponential that it follows.
-fn of_air(record: &Record, noise: f64) -> Option<(Vec<f64>, Option<Exponential>)> {
-    if record.count() < FEWEST {
-        return None;
+impl Moment {
+    /// A variance with the interval that its random error gives.
+    fn of_variance(
+        value: f64,
+        random: f64,
+        scale_se: f64,
+        (systematic, time_s): (f64, f64),
+    ) -> Self {
+        let interval = if value > 0.0 && random > 0.0 {
+            of_variance(value, 2.0 * (value / random).powi(2))
+        } else {
+            [0.0, value + WIDTH * random]
+        };
+        let [low, high] = scaled(value, interval, 2.0 * scale_se);
+        Self { value, low, high, random, systematic, time_s }
     }
-    let mut lags = auto(record, lags_of(record));
-    lags[0] -= noise;
-    let fitted = Exponential::fit(&lags, record.step_s(), length_s(record), 1);
-    let taken = fitted.map_or(0.0, |fitted| fitted.in_mean * fitted.variance);
-    let end = first_lost(&lags).unwrap_or(lags.len());
-    lags.truncate(end.max(1));
-    for value in &mut lags {
-        *value += taken;
-    }
-    Some((lags, fitted))
 }
 
 /// Variance of the mean of products whose covariances at a lag is `of(lag)`, over a record of so many values.
@@ -66,122 +167,50 @@ fn of_mean(count: f64, lags: usize, of: impl Fn(usize) -> f64) -> f64 {
 /// The random error is that of a Gaussian process with the record's autocovariance; the interval is that of a chi-squared
 /// distribution with the degrees of freedom which give this error.
 pub fn variance(record: &Record, noise: f64, scale_se: f64) -> Option<Moment> {
-    let (lags, fitted) = of_air(record, noise)?;
-    let value = lags[0].max(0.0);
-    let taken = fitted.map_or(0.0, |fitted| fitted.in_mean * fitted.variance);
-    // Noise is in the scatter of what was measured, too.
-    let measured = |lag: usize| lags[lag] + if lag == 0 { noise } else { 0.0 };
-    let mut random2 = 2.0 * of_mean(record.count() as f64, lags.len(), |lag| measured(lag).powi(2));
-    if let Some(fitted) = fitted {
-        // Where one realisation happens to be lost early, its exponential goes on: a record that knows only few eddies
-        // must not believe in many.
-        let model = expected(fitted.time_s, length_s(record)).variance;
-        random2 = random2.max((model * value).powi(2));
-    }
-    // What the mean takes away varies as a variance with one degree of freedom.
-    random2 += 2.0 * taken.powi(2);
-    let random = random2.sqrt();
-    let interval = if value > 0.0 && random > 0.0 {
-        of_variance(value, 2.0 * (value / random).powi(2))
-    } else {
-        [0.0, value + WIDTH * random]
-    };
-    let [low, high] = scaled(value, interval, 2.0 * scale_se);
-    let time_s = fitted.map_or(0.0, |fitted| fitted.time_s);
-    Some(Moment { value, low, high, random, systematic: taken, time_s })
+    Some(Known::of(record)?.variance(noise, scale_se))
 }
 
 /// Mean variance of several records of the same air and length, as of drones that fly side by side, (m/s)², with the error
 /// of the mean: records that see the same eddies are not independent, which their covariances tell. `noise` is that of
 /// each record. `None` where no record has a variance.
 pub fn mean_variance(records: &[&Record], noise: &[f64], scale_se: f64) -> Option<Moment> {
-    let own: Vec<(&Record, Moment)> = records
+    let own: Vec<(Known, Moment)> = records
         .iter()
         .zip(noise)
-        .filter_map(|(record, noise)| Some((*record, variance(record, *noise, 0.0)?)))
+        .filter_map(|(record, noise)| {
+            let known = Known::of(record)?;
+            let moment = known.variance(*noise, 0.0);
+            Some((known, moment))
+        })
         .collect();
     let count = own.len() as f64;
-    if own.is_empty() {
-        return None;
-    }
     let mean =
         |of: &dyn Fn(&Moment) -> f64| own.iter().map(|(_, own)| of(own)).sum::<f64>() / count;
-    let value = mean(&|own| own.value);
-    let lags = own
-        .iter()
-        .filter_map(|(record, _)| of_air(record, 0.0))
-        .map(|(lags, _)| lags.len())
-        .max()
-        .unwrap_or(1);
-    let autos: Vec<Vec<f64>> = own.iter().map(|(record, _)| auto(record, lags)).collect();
-    let mut random2: f64 = own.iter().map(|(_, own)| own.random.powi(2)).sum();
+    let lags = own.iter().map(|(known, _)| known.of_air(0.0).0.len()).max()?;
+    let independent: f64 = own.iter().map(|(_, own)| own.random.powi(2)).sum();
+    let mut random2 = independent;
     for (i, (one, _)) in own.iter().enumerate() {
-        for (j, (other, _)) in own.iter().enumerate().skip(i + 1) {
-            random2 += 2.0 * shared([one, other], [&autos[i], &autos[j]], lags);
+        for (other, _) in &own[i + 1..] {
+            random2 += 2.0 * one.shared(other, lags);
         }
     }
     // Never better than records that know nothing of each other would be, nor worse than one.
-    let independent: f64 = own.iter().map(|(_, own)| own.random.powi(2)).sum();
     let worst = (count * mean(&|own| own.random)).powi(2);
     let random = random2.clamp(independent.min(worst), worst).sqrt() / count;
-    let interval = if value > 0.0 && random > 0.0 {
-        of_variance(value, 2.0 * (value / random).powi(2))
-    } else {
-        [0.0, value + WIDTH * random]
-    };
-    let [low, high] = scaled(value, interval, 2.0 * scale_se);
-    let systematic = mean(&|own| own.systematic);
-    Some(Moment { value, low, high, random, systematic, time_s: mean(&|own| own.time_s) })
-}
-
-/// Covariance of the variances of two records: `2/n` times the sum of their squared covariance over lags of either sign,
-/// less what the estimates of that scatter by.
-fn shared([a, b]: [&Record; 2], [of_a, of_b]: [&[f64]; 2], lags: usize) -> f64 {
-    let count = a.count().min(b.count()) as f64;
-    if count == 0.0 {
-        return 0.0;
-    }
-    let (later, earlier) = (cross(a, b, lags), cross(b, a, lags));
-    let scatter = of_mean(count, lags, |lag| of_a[lag] * of_b[lag]);
-    let both = later.iter().chain(earlier.iter().skip(1));
-    let sum: f64 = both.filter(|value| !value.is_nan()).map(|value| value.powi(2) - scatter).sum();
-    2.0 * sum / count
+    let rest = (mean(&|own| own.systematic), mean(&|own| own.time_s));
+    Some(Moment::of_variance(mean(&|own| own.value), random, scale_se, rest))
 }
 
 /// Covariance of two records of the same steps, (m/s)²; `None` where they have too little in common. `scale_se` is the
 /// relative standard error of the product of their scales.
 pub fn covariance(a: &Record, b: &Record, scale_se: f64) -> Option<Moment> {
-    let both = a.values().iter().zip(b.values()).filter(|(a, b)| !(*a * *b).is_nan()).count();
-    if both < FEWEST {
-        return None;
-    }
-    let lags = lags_of(a).min(lags_of(b));
-    let of_a = auto(a, lags);
-    let of_b = auto(b, lags);
-    let (later, earlier) = (cross(a, b, lags), cross(b, a, lags));
-    let value = later[0];
-    if value.is_nan() {
-        return None;
-    }
-    let end = |lags: &[f64]| first_lost(lags).unwrap_or(lags.len());
-    let until = end(&of_a).min(end(&of_b)).max(1);
-    let product = |lag: usize| of_a[lag] * of_b[lag] + later[lag] * earlier[lag];
-    let random2 = of_mean(both as f64, until, product).max(0.0);
-    let fitted = Exponential::fit(&of_a, a.step_s(), length_s(a), 1);
-    // The two means take of the covariance what each takes of its variance.
-    let time_s = fitted.map_or(0.0, |fitted| fitted.time_s);
-    let share = fitted.map_or(0.0, |fitted| share_in_mean(fitted.time_s, length_s(a))).min(0.5);
-    let systematic = value * share / (1.0 - share);
-    let value = value + systematic;
-    let random = random2.sqrt() / (1.0 - share);
-    let width = WIDTH * random.hypot(value * scale_se);
-    Some(Moment { value, low: value - width, high: value + width, random, systematic, time_s })
+    Known::of(a)?.covariance(&Known::of(b)?, 0, scale_se).map(|(moment, _)| moment)
 }
 
 /// Skewness of a record: its third central moment by the 3/2 power of its variance without noise (white noise has no
 /// third moment of its own). The random error is that of a Gaussian process; `None` where there is no variance.
 pub fn skewness(record: &Record, noise: f64) -> Option<Moment> {
-    let (lags, fitted) = of_air(record, noise)?;
+    let (lags, fitted) = Known::of(record)?.of_air(noise);
     let value2 = lags[0];
     if value2 <= 0.0 {
         return None;

@@ -2,7 +2,7 @@
 
 use crate::Record;
 use crate::autocovariance::cross;
-use crate::moments::{Moment, covariance};
+use crate::moments::{Known, Moment};
 use crate::quantile::WIDTH;
 
 /// Correlations below this say nothing of when the air comes by.
@@ -47,16 +47,18 @@ pub fn by_distance(
     scale_se: f64,
 ) -> Vec<DistanceClass> {
     let mut classes = std::collections::BTreeMap::<u64, Vec<Pair>>::new();
-    for (i, one) in points.iter().enumerate() {
-        for other in &points[i + 1..] {
-            let [x, y] = [0, 1].map(|axis| other.place_m[axis] - one.place_m[axis]);
+    let known: Vec<_> =
+        points.iter().filter_map(|at| Some((at.place_m, Known::of(at.record)?))).collect();
+    for (i, (place_m, one)) in known.iter().enumerate() {
+        for (other_m, other) in &known[i + 1..] {
+            let [x, y] = [0, 1].map(|axis| other_m[axis] - place_m[axis]);
             let distance_m = x.hypot(y);
-            let Some(moment) = covariance(one.record, other.record, scale_se) else { continue };
-            let (later, earlier) =
-                (cross(one.record, other.record, lags), cross(other.record, one.record, lags));
-            let both = later.iter().zip(earlier).map(|(a, b)| 0.5 * (a + b)).collect();
+            let Some((moment, [later, earlier])) = one.covariance(other, lags, scale_se) else {
+                continue;
+            };
+            let both = later.iter().zip(earlier).take(lags + 1).map(|(a, b)| 0.5 * (a + b));
             let class = (distance_m / width_m) as u64;
-            classes.entry(class).or_default().push((distance_m, moment, both));
+            classes.entry(class).or_default().push((distance_m, moment, both.collect()));
         }
     }
     let class = |pairs: Vec<Pair>| {

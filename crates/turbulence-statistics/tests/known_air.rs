@@ -53,32 +53,40 @@ impl Air {
         self.density(frequency_hz) + folded.sum::<f64>()
     }
 
-    /// A record of it at instants, a part of one that is sixteen times as long.
-    fn draw(&self, seed: u64, noise: f64) -> Record {
-        drawn(seed, noise, &|frequency_hz| self.sampled(frequency_hz))
+    /// Records of it at instants.
+    fn at_instants(&self) -> Spectrum {
+        Spectrum::of(|frequency_hz| self.sampled(frequency_hz))
     }
 
-    /// A record of an instrument that passes only what its sampling can show.
-    fn draw_limited(&self, seed: u64, noise: f64) -> Record {
-        drawn(seed, noise, &|frequency_hz| self.density(frequency_hz))
+    /// Records of an instrument that passes only what its sampling can show.
+    fn limited(&self) -> Spectrum {
+        Spectrum::of(|frequency_hz| self.density(frequency_hz))
     }
 }
 
-/// A record with this density and white noise.
-fn drawn(seed: u64, noise: f64, density: &dyn Fn(f64) -> f64) -> Record {
-    let mut random = Pcg64::seed_from_u64(seed);
-    let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-    let count = 16 * COUNT;
-    let step_hz = 1.0 / (count as f64 * STEP_S);
-    let mut lines = vec![Complex64::default(); count];
-    for line in 1..count / 2 {
-        let amplitude = (density(line as f64 * step_hz) * step_hz).sqrt() / 2.0;
-        lines[line] = Complex64::new(draw(), draw()) * amplitude;
-        lines[count - line] = lines[line].conj();
+/// Amplitudes of the lines of records sixteen times as long as those that are drawn.
+struct Spectrum(Vec<f64>);
+
+impl Spectrum {
+    fn of(density: impl Fn(f64) -> f64) -> Self {
+        let step_hz = 1.0 / (16.0 * COUNT as f64 * STEP_S);
+        let line = |line: usize| (density(line as f64 * step_hz) * step_hz).sqrt() / 2.0;
+        Self((1..8 * COUNT).map(line).collect())
     }
-    FftPlanner::new().plan_fft_inverse(count).process(&mut lines);
-    let values: Vec<f64> = lines[..COUNT].iter().map(|line| line.re).collect();
-    Record::new(STEP_S, values.into_iter().map(|value| Some(value + noise * draw())))
+
+    /// A part of a drawn record, with white noise.
+    fn draw(&self, seed: u64, noise: f64) -> Record {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut lines = vec![Complex64::default(); 16 * COUNT];
+        for (amplitude, line) in self.0.iter().zip(1..) {
+            lines[line] = Complex64::new(draw(), draw()) * amplitude;
+            lines[16 * COUNT - line] = lines[line].conj();
+        }
+        FftPlanner::new().plan_fft_inverse(lines.len()).process(&mut lines);
+        let values: Vec<f64> = lines[..COUNT].iter().map(|line| line.re).collect();
+        Record::new(STEP_S, values.into_iter().map(|value| Some(value + noise * draw())))
+    }
 }
 
 fn share(of: impl ExactSizeIterator<Item = bool>) -> f64 {
@@ -99,9 +107,10 @@ fn variances_are_inside_their_intervals() {
         (Air { length_m: 25.0, wind_mps: 6.0, ..FIELD }, 0.3),
     ] {
         let truth = air.sd_mps.powi(2);
+        let spectrum = air.at_instants();
         let found: Vec<_> = (0..400)
             .map(|seed| {
-                let record = air.draw(seed, noise_mps);
+                let record = spectrum.draw(seed, noise_mps);
                 let noise = noise::white(&record).unwrap();
                 moments::variance(&record, noise, 0.0).unwrap()
             })
@@ -118,8 +127,9 @@ fn variances_are_inside_their_intervals() {
 fn spectra_are_inside_their_bands() {
     let instrument = Instrument { noise: 0.01, highest_hz: 1.0, ..Instrument::default() };
     let mut inside = std::collections::BTreeMap::<u64, Vec<bool>>::new();
+    let limited = FIELD.limited();
     for seed in 0..300 {
-        for band in spectrum(&FIELD.draw_limited(seed, 0.1), &instrument) {
+        for band in spectrum(&limited.draw(seed, 0.1), &instrument) {
             let truth = FIELD.density(band.frequency_hz);
             let key = (band.frequency_hz.log10() * 8.0 + 80.0).floor() as u64;
             inside.entry(key).or_default().push(band.low <= truth && truth <= band.high);
@@ -143,8 +153,9 @@ fn dissipation_is_that_of_the_air() {
     let wind = Wind { speed_mps: 3.0, se_mps: 0.1 };
     let mut found = Vec::new();
     let mut structure = Vec::new();
+    let limited = FIELD.limited();
     for seed in 0..200 {
-        let record = FIELD.draw_limited(seed, 0.1);
+        let record = limited.draw(seed, 0.1);
         let bands = spectrum(&record, &instrument);
         if let Ok(of) = from_spectrum(&bands, Component::Across, wind, 3.0 / 50.0, 0.0) {
             structure.extend(
@@ -188,8 +199,9 @@ fn air_without_an_inertial_range_has_no_dissipation() {
 
 #[test]
 fn noise_is_told_from_air() {
+    let spectrum = FIELD.at_instants();
     for noise_mps in [0.0, 0.1, 0.3] {
-        let found = (0..100).map(|seed| noise::white(&FIELD.draw(seed, noise_mps)).unwrap());
+        let found = (0..100).map(|seed| noise::white(&spectrum.draw(seed, noise_mps)).unwrap());
         let mean = found.sum::<f64>() / 100.0;
         println!("{noise_mps}: {mean}");
         // What is left is a hundredth of the air's variance.

@@ -32,15 +32,22 @@ impl Field {
     }
 
     fn record(&self, [x, y]: [f64; 2], noise: &mut impl FnMut() -> f64) -> Record {
-        let at = |step: usize| {
-            let time_s = step as f64 * STEP_S;
-            let [east, north] = [x - self.wind_mps[0] * time_s, y - self.wind_mps[1] * time_s];
-            let waves = self.waves.iter();
-            waves
-                .map(|([kx, ky], phase, of)| of * (kx * east + ky * north + phase).cos())
-                .sum::<f64>()
-        };
-        Record::new(STEP_S, (0..COUNT).map(|step| Some(at(step) + noise())).collect::<Vec<_>>())
+        let mut values = vec![0.0; COUNT];
+        let [east_mps, north_mps] = self.wind_mps;
+        for ([kx, ky], phase, amplitude) in &self.waves {
+            // The phase of a wave that is carried along turns by the same angle each step.
+            let turn = -(kx * east_mps + ky * north_mps) * STEP_S;
+            let (turn_sin, turn_cos) = turn.sin_cos();
+            let (mut sin, mut cos) = (kx * x + ky * y + phase).sin_cos();
+            for value in &mut values {
+                *value += amplitude * cos;
+                (sin, cos) = (sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin);
+            }
+        }
+        Record::new(
+            STEP_S,
+            values.into_iter().map(|value| Some(value + noise())).collect::<Vec<_>>(),
+        )
     }
 }
 
