@@ -77,10 +77,21 @@ struct Spread {
     dof: Option<f64>,
 }
 
+/// Whether each of these has an error.
+fn all_known(changes: &[Estimate]) -> bool {
+    changes.iter().all(|change| change.se > 0.0 && change.se.is_finite())
+}
+
+/// Weights of a median over drones: by their errors, or alike where one is not known.
+fn weights(changes: &[Estimate]) -> impl Iterator<Item = f64> {
+    let all_known = all_known(changes);
+    changes.iter().map(move |change| if all_known { 1.0 / change.se } else { 1.0 })
+}
+
 fn spread(changes: &[Estimate], basis: Basis) -> Option<Spread> {
-    let all_known = changes.iter().all(|change| change.se > 0.0 && change.se.is_finite());
-    let weight = |change: &Estimate| if all_known { 1.0 / change.se } else { 1.0 };
-    let weighted: Vec<_> = changes.iter().map(|change| (change.value, weight(change))).collect();
+    let all_known = all_known(changes);
+    let weighted: Vec<_> =
+        changes.iter().map(|change| change.value).zip(weights(changes)).collect();
     let median = weighted_median(&weighted)?;
     let n = changes.len();
     let standard: Vec<f64> =
@@ -218,13 +229,8 @@ pub(super) fn compare(couple: &Couple<'_>, a: &FleetLaws, b: &FleetLaws) -> Opti
 
 /// Where the drones in both are between their two flights: the median, weighted as that of their changes.
 fn level_of(before: &[Estimate], after: &[Estimate], changes: &[Estimate]) -> Option<f64> {
-    let all_known = changes.iter().all(|change| change.se > 0.0 && change.se.is_finite());
-    let values: Vec<_> = (before.iter().zip(after).zip(changes))
-        .map(|((a, b), change)| {
-            (f64::midpoint(a.value, b.value), if all_known { 1.0 / change.se } else { 1.0 })
-        })
-        .collect();
-    weighted_median(&values)
+    let levels = before.iter().zip(after).map(|(a, b)| f64::midpoint(a.value, b.value));
+    weighted_median(&levels.zip(weights(changes)).collect::<Vec<_>>())
 }
 
 /// Corrects the tests of all drones of a pair together.

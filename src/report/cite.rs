@@ -8,7 +8,7 @@ use minijinja::value::Value;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::digest::sha256_of_list;
 
-use super::opening::{day_and_time, site_words, when};
+use super::opening::{When, day_and_time, named_site, when};
 use super::page::capitalised;
 use super::text::{clean, count};
 use super::{InputFile, Provenance};
@@ -23,7 +23,7 @@ const MOST_LISTED: usize = 12;
 pub(super) fn citation(analysis: &Analysis, title: &str, provenance: &Provenance) -> Value {
     let simulated = analysis.flights.iter().any(|flight| flight.simulated);
     let flights: Vec<Value> = analysis.flights.iter().take(MOST_LISTED).map(flight_line).collect();
-    let site = analysis.flights.iter().find_map(|flight| flight.site.as_ref()).map(site_words);
+    let site = named_site(&analysis.flights);
     let is_listed = |input: &&InputFile| {
         LISTED.iter().any(|name| input.path == *name || input.path.ends_with(&format!("/{name}")))
     };
@@ -82,14 +82,9 @@ fn line(
 }
 
 fn flight_line(flight: &FlightAnalysis) -> Value {
-    let time = when(flight).and_then(|when| {
-        let [from, to] = when.span_s.map(|s| when.unix_s(s));
-        let ((day, from), (_, to)) = (day_and_time(from?), day_and_time(to?));
-        Some(format!("{day} {from} to {to} UTC"))
-    });
     context! {
         name => capitalised(&clean(&flight.name)),
-        time,
+        time => when(flight).and_then(When::utc),
         drones => count(flight.drones.len(), "drone"),
     }
 }

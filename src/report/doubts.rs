@@ -6,7 +6,7 @@ use untrusted_io::names::listed;
 
 use crate::analysis::result::{Quality, UpdraftMap};
 
-use super::text::{count, fixed, shortened};
+use super::text::{fixed, shortened};
 use super::typographic::typographic;
 
 /// Most lines of the table.
@@ -72,7 +72,7 @@ fn line(kind: &Kind) -> Value {
     let more = kind.stretches > kind.drones.len();
     context! {
         drone => if more {
-            format!("{drones} ({})", count(kind.stretches, "stretch").replace("stretchs", "stretches"))
+            format!("{drones} ({} stretches)", kind.stretches)
         } else {
             drones
         },

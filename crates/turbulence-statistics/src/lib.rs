@@ -1,4 +1,4 @@
-//! Statistics of turbulence from records at fixed points, with errors that hold.
+#![doc = include_str!("../README.md")]
 //!
 //! A record ([`Record`]) is a quantity at even steps of time, in m/s for winds, with gaps where it is not known. What is
 //! stated of it:

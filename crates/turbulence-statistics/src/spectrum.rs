@@ -9,7 +9,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
 use crate::Record;
-use crate::quantile::{WIDTH, of_variance, scaled};
+use crate::quantile::{of_variance, scaled};
 use crate::transfer::Transfer;
 
 /// Bands in a decade of frequency.
@@ -326,9 +326,4 @@ pub fn slope(bands: &[Band]) -> Option<(f64, f64)> {
     let square: f64 = known.iter().map(|(at, _, weight)| weight * (at - x).powi(2)).sum();
     let both: f64 = known.iter().map(|(at, of, weight)| weight * (at - x) * (of - y)).sum();
     (square > 0.0).then(|| (both / square, square.recip().sqrt()))
-}
-
-/// Half the width of the interval of a slope.
-pub fn slope_width(se: f64) -> f64 {
-    WIDTH * se
 }

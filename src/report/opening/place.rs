@@ -34,6 +34,14 @@ impl When {
         usable(show_s).then(|| nearest(show_s).div_euclid(1000))
     }
 
+    /// `2026-06-01 12:00:18 to 12:06:02 UTC`; `None` where logs do not tell.
+    pub(in crate::report) fn utc(self) -> Option<String> {
+        let [from, to] = self.span_s.map(|show_s| self.unix_s(show_s));
+        let ((day, from), (last_day, to)) = (day_and_time(from?), day_and_time(to?));
+        let to = if day == last_day { to } else { format!("{last_day} {to}") };
+        Some(format!("{day} {from} to {to} UTC"))
+    }
+
     /// Length, s.
     pub(in crate::report) fn length_s(self) -> f64 {
         self.span_s[1] - self.span_s[0]
@@ -54,7 +62,7 @@ pub(in crate::report) fn when(flight: &FlightAnalysis) -> Option<When> {
 }
 
 /// `47.4733° N, 19.0621° E, ground 190 m above sea level`
-pub(in crate::report) fn site_words(site: &FlightSite) -> String {
+fn site_words(site: &FlightSite) -> String {
     let side = |deg: f64, sides: [&str; 2]| {
         format!("{}° {}", fixed(deg.abs(), 4), sides[usize::from(deg < 0.0)])
     };
@@ -117,26 +125,37 @@ fn flown(flights: &[FlightAnalysis]) -> String {
     }
 }
 
+/// Site of which pages tell: a plan's, which knows the ground's height, else that of the first fixes.
+fn shown_site(flights: &[FlightAnalysis]) -> Option<&FlightSite> {
+    let sites = || flights.iter().filter_map(|flight| flight.site.as_ref());
+    sites().find(|site| site.planned).or_else(|| sites().next())
+}
+
+/// `Airfield, 47.4733° N, 19.0621° E, ground 190 m above sea level`; `None` where neither a plan nor a log says.
+pub(in crate::report) fn named_site(flights: &[FlightAnalysis]) -> Option<String> {
+    let mut names = flights.iter().filter_map(|flight| flight.site_name.as_deref()).map(clean);
+    let name = names.next().map_or_else(String::new, |name| format!("{name}, "));
+    Some(format!("{name}{}", site_words(shown_site(flights)?)))
+}
+
 fn place(flights: &[FlightAnalysis]) -> String {
-    let sites: Vec<FlightSite> = flights.iter().filter_map(|flight| flight.site).collect();
-    let Some(first) = sites.first() else {
+    let Some((shown, named)) = shown_site(flights).zip(named_site(flights)) else {
         return "at a place that neither a plan nor the logs tell".to_owned();
     };
-    let near = |site: &FlightSite| {
+    let sites: Vec<&FlightSite> =
+        flights.iter().filter_map(|flight| flight.site.as_ref()).collect();
+    let near = |site: &&FlightSite| {
+        let first = sites.first().unwrap_or(site);
         (site.lat_deg - first.lat_deg).abs() < SAME_PLACE_DEG
             && (site.lon_deg - first.lon_deg).abs() < SAME_PLACE_DEG
     };
-    // A plan knows the ground's height, which first fixes do not.
-    let mut names = flights.iter().filter_map(|flight| flight.site_name.as_deref()).map(clean);
-    let name = names.next().map_or_else(String::new, |name| format!("{name}, "));
-    let shown = sites.iter().find(|site| site.planned).unwrap_or(first);
     let of = if shown.planned { "" } else { " (the drones' first fixes)" };
     let apart = if sites.iter().all(near) {
         ""
     } else {
         ", and elsewhere: the flights are of several places"
     };
-    format!("at {name}{}{of}{apart}", site_words(shown))
+    format!("at {named}{of}{apart}")
 }
 
 /// `Hover: 2026-06-02 12:00 to 12:02 UTC, 1 min 49 s at 100 m above the ground, by 15 of 16 drones.`
@@ -152,14 +171,10 @@ fn flight_sentence(flight: &FlightAnalysis) -> String {
     let Some(when) = when(flight) else {
         return format!("{name}: nothing steady was flown{drones}.");
     };
-    let clock = match (when.unix_s(when.span_s[0]), when.unix_s(when.span_s[1])) {
-        (Some(from), Some(to)) => {
-            let ((day, from), (last_day, to)) = (day_and_time(from), day_and_time(to));
-            let to = if day == last_day { to } else { format!("{last_day} {to}") };
-            format!("{day} {from} to {to} UTC{}", local(flight, when))
-        }
-        _ => "when is not known (the logs have no GPS time)".to_owned(),
-    };
+    let clock = when.utc().map_or_else(
+        || "when is not known (the logs have no GPS time)".to_owned(),
+        |utc| format!("{utc}{}", local(flight, when)),
+    );
     let what = match flight.purpose {
         Purpose::Calibration => " of climbs and descents".to_owned(),
         Purpose::Measurement => heights(flight),

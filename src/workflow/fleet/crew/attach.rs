@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Crew;
-use super::start::TAKEN_TOGETHER;
+use super::hear::hear_together;
 use crate::base::names::listed;
 use crate::base::time::{GpsTime, WEEK_S};
 use crate::campaign::start::StartRecord;
@@ -118,14 +118,11 @@ impl Crew<'_> {
             && self.net.in_the_air(self.drones(), false).is_empty()
         {
             self.host.check_stop()?;
-            let (mut wait, until) = (self.net.now() + 100 * MS, self.net.now() + TAKEN_TOGETHER);
-            while let Some(received) = self.net.recv(wait)? {
-                wait = self.net.now();
-                self.telemetry.on_message(wait, &received);
-                if wait >= until {
-                    break;
-                }
-            }
+            let wait = self.net.now() + 100 * MS;
+            let telemetry = &mut self.telemetry;
+            hear_together(&mut self.net, wait, |now, received| {
+                telemetry.on_message(now, received);
+            })?;
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ mod end;
 mod ends;
 mod eyes;
 mod guided;
+mod hear;
 mod identity;
 mod keep;
 mod load;

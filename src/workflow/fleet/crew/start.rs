@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use super::Crew;
 use super::down::{SHOW_LEFT, bring_down, in_words, stopped};
 use super::eyes::Eyes;
+use super::hear::hear_together;
 use crate::base::time::GpsTime;
 use crate::fleet::abort::Aborted;
 use crate::fleet::journal::Journal;
 use crate::fleet::start::{Start, StartOptions, StartPhase};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
-use crate::link::clock::{MS, Micros, S};
+use crate::link::clock::{MS, S};
 use crate::link::conversation::Observer as _;
 use crate::link::error::NetError;
 use crate::link::id::DroneId;
@@ -25,9 +26,6 @@ use crate::workflow::host::News;
 /// everyone knows, but no more often than this.
 const TOLD_AT_LEAST: u32 = 5;
 const TOLD_AT_MOST: u32 = 50;
-/// Messages that come within this time are taken before all drones are looked at again: looking costs as much as taking
-/// hundreds.
-pub(super) const TAKEN_TOGETHER: Micros = 20 * MS;
 
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
@@ -195,17 +193,8 @@ impl<'a> Crew<'a> {
                     sent => sent?,
                 }
             }
-            let (mut wait, until) =
-                (start.next().clamp(now + MS, now + 100 * MS), now + TAKEN_TOGETHER);
-            // What is there is taken before all drones are looked at again.
-            while let Some(received) = self.net.recv(wait)? {
-                let now = self.net.now();
-                eyes.on_message(now, &received);
-                wait = now;
-                if now >= until {
-                    break;
-                }
-            }
+            let next = start.next().clamp(now + MS, now + 100 * MS);
+            hear_together(&mut self.net, next, |now, received| eyes.on_message(now, received))?;
             eyes.stop(self.net.now());
             eyes.ask_times(&mut self.net);
             eyes.ask_streams(&mut self.net);
