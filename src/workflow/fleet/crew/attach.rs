@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Crew;
 use super::hear::hear_together;
-use crate::base::names::listed;
 use crate::base::time::{GpsTime, WEEK_S};
 use crate::campaign::start::StartRecord;
 use crate::fleet::gate::State;
@@ -84,8 +83,7 @@ impl Crew<'_> {
             open.retain(|drone| has_start(self, drone));
         }
         let names = |drones: &BTreeSet<DroneId>| {
-            let drones: Vec<String> = drones.iter().map(ToString::to_string).collect();
-            listed(drones.iter().map(String::as_str))
+            drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
         };
         if open.is_empty() {
             self.host.say(&format!(
