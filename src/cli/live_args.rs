@@ -18,7 +18,7 @@ use crate::live::view::{Level, Step};
 use crate::mission::Plan;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
-use crate::workflow::live::{Address, AirWatch, AirWish, LiveWish, Served, serve};
+use crate::workflow::live::{Address, AirWatch, AirWish, LiveWish, Served, recall, serve};
 
 /// How a page is served.
 #[derive(Clone, Debug, Args)]
@@ -102,7 +102,8 @@ impl LiveArgs {
         let air = AirWatch::begin(context, &station, plan, &wish_of_air)?;
         let source = Arc::clone(&station);
         let source: Arc<dyn Source> = source;
-        let served = serve(context, &folder.0, &source, &wish)?;
+        recall(context, &station, folder, plan);
+        let served = serve(context, campaign, &folder.0, &source, &wish)?;
         Ok(Live { station: Some(station), orders: self.live_orders, air, _served: Some(served) })
     }
 }

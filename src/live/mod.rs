@@ -9,6 +9,7 @@
 //! another terminal ([`crate::fleet::orders`]).
 
 pub mod facts;
+pub mod files;
 pub mod frames;
 pub mod http;
 pub mod orders;

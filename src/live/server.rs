@@ -5,11 +5,13 @@
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::facts::Facts;
+use super::files;
 use super::frames::Looks;
 use super::http::guard::{Door, Rank};
 use super::http::request::{MOST_BODY_BYTES, MOST_HEAD_BYTES, Method, Parsed, Request, parse};
@@ -54,6 +56,8 @@ pub struct Setup {
     pub look: String,
     /// Secret of those who may give orders, if anybody may.
     pub order: Option<String>,
+    /// Folder of the campaign, whose pages and results may be read, too.
+    pub campaign: Option<PathBuf>,
 }
 
 struct Shared {
@@ -231,7 +235,7 @@ fn refuse(stream: &TcpStream, status: Status) {
 }
 
 fn answer(mut stream: &TcpStream, status: Status, kind: Kind<'_>, body: &[u8]) -> io::Result<()> {
-    let head = head(status, kind, Some(body.len()));
+    let head = head(status, kind, Some(body.len() as u64));
     stream.write_all(head.as_bytes())?;
     stream.write_all(body)
 }
@@ -269,6 +273,9 @@ fn serve(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
         Parsed::Refused(status) => return answer(stream, status, Kind::Text, b""),
         Parsed::Partial => return Ok(()),
     };
+    if let Some((secret, path)) = files::split(&request.path) {
+        return file(stream, shared, &request, secret, path);
+    }
     if let Err(status) = shared.door.admit(&request) {
         return answer(stream, status, Kind::Text, b"");
     }
@@ -293,6 +300,28 @@ fn serve(stream: &TcpStream, shared: &Shared) -> io::Result<()> {
         }
         _ => answer(stream, Status::NotFound, Kind::Text, b""),
     }
+}
+
+/// Sends a file of the campaign.
+fn file(
+    mut stream: &TcpStream,
+    shared: &Shared,
+    request: &Request,
+    secret: &str,
+    path: &str,
+) -> io::Result<()> {
+    let refuse = |status| answer(stream, status, Kind::Text, b"");
+    if let Err(status) = shared.door.admit_reader(request, secret) {
+        return refuse(status);
+    }
+    let Some(root) = &shared.setup.campaign else { return refuse(Status::NotFound) };
+    let Some((file, media, length)) = files::open(root, path) else {
+        return refuse(Status::NotFound);
+    };
+    stream.write_all(head(Status::Ok, Kind::File { media }, Some(length)).as_bytes())?;
+    // A file that grows meanwhile is sent as long as was said.
+    io::copy(&mut file.take(length), &mut stream)?;
+    Ok(())
 }
 
 fn wish(stream: &TcpStream, shared: &Shared, request: &Request) -> io::Result<()> {
@@ -332,6 +361,10 @@ fn events(mut stream: &TcpStream, shared: &Shared, rank: Rank) -> io::Result<()>
     stream.write_all(head(Status::Ok, Kind::Events, None).as_bytes())?;
     let facts = serde_json::to_string(&shared.facts.clone().seen_by(rank))?;
     stream.write_all(format!("retry: {RETRY_MS}\nevent: facts\ndata: {facts}\n\n").as_bytes())?;
+    if let Some(root) = &shared.setup.campaign {
+        let links = serde_json::to_string(&files::links(root, &shared.setup.look))?;
+        stream.write_all(format!("event: links\ndata: {links}\n\n").as_bytes())?;
+    }
     let _watching = Watching::begin(&shared.watched);
     shared.look();
     let mut seen: Option<(u64, usize, u64)> = None;

@@ -224,12 +224,15 @@ impl Station {
         let at_ms = self.clock.unix_us() / 1000;
         let mut now = self.lock();
         for line in text.lines().map(str::trim_end).filter(|line| !line.is_empty()) {
-            now.said_ever += 1;
-            let said = Said { number: now.said_ever, at_ms, level, text: line.to_owned() };
-            now.said.push_back(said);
-            if now.said.len() > MOST_SAID {
-                now.said.pop_front();
-            }
+            now.push(Said { number: 0, at_ms, level, text: line.to_owned() });
+        }
+    }
+
+    /// What was said before this station was opened, the oldest first.
+    pub fn recall(&self, said: Vec<Said>) {
+        let mut now = self.lock();
+        for said in said {
+            now.push(said);
         }
     }
 
@@ -390,6 +393,15 @@ impl Source for Station {
 }
 
 impl Now {
+    /// Takes a sentence with the next number.
+    fn push(&mut self, said: Said) {
+        self.said_ever += 1;
+        self.said.push_back(Said { number: self.said_ever, ..said });
+        if self.said.len() > MOST_SAID {
+            self.said.pop_front();
+        }
+    }
+
     fn take_events(&mut self) {
         for told in self.monitor.take_events() {
             self.words.insert(told.drone, told.event.to_string());

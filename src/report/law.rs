@@ -2,7 +2,7 @@
 
 use crate::analysis::law::{LawKind, Symbol};
 use crate::analysis::prefer;
-use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
+use crate::analysis::result::{BentLine, DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
 
 use super::axis::Axis;
 use super::chart::Mark;
@@ -70,14 +70,29 @@ pub(super) fn linear_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> {
     sampled(axis, |v| slope * v + u0)
 }
 
+/// Points (V_U, u) of a line that may bend, within the speeds of its windows.
+pub(super) fn bent_curve(line: &BentLine) -> Vec<(f64, f64)> {
+    let [low, high] = line.speeds_mps;
+    let effort = |v: f64| {
+        let bends = line.bend.value * v * v + line.drag.value * v * v.abs();
+        line.u0.value + line.slope.value * v + bends
+    };
+    let all = [low, high, line.u0.value, line.slope.value, line.bend.value, line.drag.value];
+    if all.into_iter().all(usable) { curve(low, high, effort) } else { Vec::new() }
+}
+
 fn value(fit: &Fit, symbol: Symbol) -> Option<f64> {
     fit.value(symbol).filter(|&value| usable(value))
 }
 
 fn sampled(axis: &Axis, law: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    curve(axis.min, axis.max, law)
+}
+
+fn curve(low: f64, high: f64, law: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     (0..CURVE_POINTS)
         .map(|i| {
-            let v = axis.min + (axis.max - axis.min) * f64::from(i) / f64::from(CURVE_POINTS - 1);
+            let v = low + (high - low) * f64::from(i) / f64::from(CURVE_POINTS - 1);
             (v, law(v))
         })
         .collect()

@@ -33,6 +33,16 @@ function takeFacts(facts) {
   drawScope();
 }
 
+/** Pages of the campaign that are there already; they open beside this one. */
+function takeLinks(links) {
+  byId("beside").hidden = !links.length;
+  byId("beside").replaceChildren(...links.map(({ title, href }) => {
+    const link = document.createElement("a");
+    Object.assign(link, { href, target: "_blank", rel: "noopener", textContent: title });
+    return link;
+  }));
+}
+
 function takeFrame(frame) {
   lastFrame_ms = Date.now();
   frames += 1;
@@ -79,6 +89,7 @@ function open() {
   }
   const stream = new EventSource(`/events?token=${encodeURIComponent(state.token)}`);
   stream.addEventListener("facts", (event) => takeFacts(JSON.parse(event.data)));
+  stream.addEventListener("links", (event) => takeLinks(JSON.parse(event.data)));
   stream.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
   stream.addEventListener("over", () => { over = true; });
   stream.onopen = () => { over = false; connection("open", "connected"); gone(""); };

@@ -54,8 +54,11 @@ pub struct Mapping {
     pub flights: Vec<TableFlight>,
 }
 
+/// No local time is further from UTC, h.
+const FURTHEST_ZONE_H: f64 = 26.0;
+
 /// Column of times, and its format.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeColumn {
     /// Name of the column of times.
@@ -63,6 +66,9 @@ pub struct TimeColumn {
     /// Format of the times.
     #[serde(default)]
     pub format: TimeFormat,
+    /// Local time of the column less UTC, h; 0: it is UTC. With it numbers count since 1970. Absent: only dates that
+    /// end in Z are known to be UTC, and numbers count since any instant.
+    pub utc_offset_h: Option<f64>,
 }
 
 /// Format of a column of times.
@@ -187,6 +193,11 @@ impl Mapping {
             if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
                 return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
             }
+        }
+        if self.time.utc_offset_h.is_some_and(|h| !(h.is_finite() && h.abs() <= FURTHEST_ZONE_H)) {
+            return Some(format!(
+                "time: utc_offset_h must be within {FURTHEST_ZONE_H} h: local time less UTC"
+            ));
         }
         if self.truth_distance_m.is_some_and(|m| !(m.is_finite() && m >= 0.0)) {
             return Some("truth_distance_m must be a distance, m, not below 0".to_owned());

@@ -6,10 +6,11 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::TableError;
-use super::mapping::{Channel, Mapping, TimeFormat};
+use super::mapping::{Channel, Mapping, TimeColumn, TimeFormat};
 use super::time::seconds_of;
 use crate::base::file::{FileError, open_named};
 use crate::base::plain::plain;
+use crate::base::time::GpsTime;
 use crate::flight::{Clock, Effort, Flight, Series};
 
 /// Rows that are read at most.
@@ -115,6 +116,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
         mapping,
         table,
         first: None,
+        start: None,
         last_s: f64::NEG_INFINITY,
         taken: 0,
         backward: 0,
@@ -191,6 +193,8 @@ struct Rows<'a> {
     table: Columns<'a>,
     /// Time of the first row, s: show time counts from it.
     first: Option<f64>,
+    /// GPS time of the first row, if the table says.
+    start: Option<GpsTime>,
     /// Show time of the last row, s.
     last_s: f64,
     taken: usize,
@@ -210,6 +214,9 @@ impl Rows<'_> {
         let text = row.get(self.table.time).unwrap_or_default();
         let time_s = time_of(text, time.format)
             .ok_or_else(|| cell(&time.column, format!("\"{}\" is not a time", short(text))))?;
+        if self.first.is_none() {
+            self.start = start(time, text, time_s);
+        }
         let show_s = time_s - *self.first.get_or_insert(time_s);
         if show_s <= self.last_s {
             self.backward += 1;
@@ -245,7 +252,7 @@ impl Rows<'_> {
             source: self.path.to_owned(),
             effort: Effort { indicator: self.mapping.indicator, ..Effort::default() },
             pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
-            clock: Clock::default(),
+            clock: Clock { start: self.start, ..Clock::default() },
             warnings: self.warnings(cut_off).into_iter().map(Into::into).collect(),
             ..Flight::default()
         };
@@ -288,6 +295,13 @@ fn time_of(text: &str, format: TimeFormat) -> Option<f64> {
         TimeFormat::Datetime => seconds_of(text)?,
     };
     (time_s.abs() <= LATEST_S).then_some(time_s)
+}
+
+/// GPS time of a cell with a time that is known to be UTC or how far from it, s.
+fn start(time: &TimeColumn, text: &str, time_s: f64) -> Option<GpsTime> {
+    let is_utc = time.format == TimeFormat::Datetime && text.trim().ends_with('Z');
+    let offset_h = if is_utc { 0.0 } else { time.utc_offset_h? };
+    GpsTime::from_unix_ms(((time_s - offset_h * 3600.0) * 1000.0).round() as i64)
 }
 
 /// Heights above the first one.

@@ -45,6 +45,24 @@ impl Door {
         }
     }
 
+    /// Refuses who may not read the campaign's files: the secret in their address is what lets in, from wherever the
+    /// request comes, as pages in a sandbox are of no site. The operator's secret belongs into no address.
+    ///
+    /// # Errors
+    /// The status to answer with.
+    pub fn admit_reader(&self, request: &Request, secret: &str) -> Result<(), Status> {
+        if !self.is_own(request.host.as_deref().ok_or(Status::BadRequest)?) {
+            return Err(Status::Forbidden);
+        }
+        if request.method != Method::Get {
+            return Err(Status::NotAllowed);
+        }
+        match self.rank(Some(secret))? {
+            Rank::Looker => Ok(()),
+            Rank::Operator => Err(Status::Forbidden),
+        }
+    }
+
     /// Refuses what another site may have sent.
     ///
     /// # Errors

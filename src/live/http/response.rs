@@ -57,29 +57,45 @@ pub enum Kind<'a> {
     Text,
     /// The small picture in the browser's tab.
     Picture,
+    /// A file of the campaign, of this media type.
+    File {
+        /// Media type of the file.
+        media: &'static str,
+    },
 }
 
 /// Line and headers of an answer; `length`: bytes of its body, none for events.
-pub fn head(status: Status, kind: Kind<'_>, length: Option<usize>) -> String {
+pub fn head(status: Status, kind: Kind<'_>, length: Option<u64>) -> String {
     let media = match kind {
         Kind::Page { .. } => "text/html; charset=utf-8",
         Kind::Json => "application/json",
         Kind::Events => "text/event-stream",
         Kind::Text => "text/plain; charset=utf-8",
         Kind::Picture => "image/svg+xml",
+        Kind::File { media } => media,
     };
     let policy = match kind {
         Kind::Page { nonce } => format!(
             "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src \
              'self'; img-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         ),
+        // In a sandbox a page is of no site: it can neither ask this server for anything nor see the flight's page.
+        Kind::File { .. } => "sandbox allow-scripts allow-downloads allow-popups; default-src 'none'; \
+             script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' data: blob:; \
+             font-src data:; connect-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+            .to_owned(),
         _ => "default-src 'none'; frame-ancestors 'none'".to_owned(),
+    };
+    // What is in a sandbox loads its pictures and data as a stranger: the secret in their addresses is what lets it in.
+    let (resources, opener) = match kind {
+        Kind::File { .. } => ("cross-origin", "unsafe-none"),
+        _ => ("same-origin", "same-origin"),
     };
     let mut text = format!(
         "HTTP/1.1 {}\r\nContent-Type: {media}\r\nContent-Security-Policy: {policy}\r\n\
          X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\
-         Cache-Control: no-store\r\nCross-Origin-Resource-Policy: same-origin\r\n\
-         Cross-Origin-Opener-Policy: same-origin\r\nConnection: close\r\n",
+         Cache-Control: no-store\r\nCross-Origin-Resource-Policy: {resources}\r\n\
+         Cross-Origin-Opener-Policy: {opener}\r\nConnection: close\r\n",
         status.line()
     );
     if let Some(length) = length {

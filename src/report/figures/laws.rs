@@ -4,14 +4,14 @@ use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
 use crate::analysis::law::{LawKind, Symbol};
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, BentLine, FlightAnalysis};
 use crate::base::estimate::Estimate;
 use crate::numeric::extent;
 
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
-use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
+use crate::report::colour::{BLUE, GREEN, INK, MUTED, VERMILLION, sequential};
 use crate::report::format::Format;
 use crate::report::law;
 use crate::report::page::capitalised;
@@ -65,11 +65,19 @@ pub(in crate::report) fn figure(analysis: &Analysis, format: Format) -> Option<F
         .chain(side.map(|side| (side, [630.0, 0.0, 410.0, 460.0])));
     let sheet = Sheet::of(format, [1040.0, 460.0], panels.collect());
     let drones: usize = flights.iter().map(|flight| flight.drones.len()).sum();
-    let colouring = if flights.len() == 1 {
+    let colouring = if let [flight] = flights.as_slice() {
+        let whose = if drones == 1 { "its windows" } else { "the flock" };
+        let bent = match bent(flight) {
+            Some(_) => {
+                " The dotted line may bend and makes the maps of this calibration: all drones' \
+                 average, brought to level flight, the air's density at the ground and one battery \
+                 voltage where these are known, so that it may pass beside the points."
+            }
+            None => "",
+        };
         format!(
             "The solid line is the signed-quadratic law, the dashed line the linear law, both fitted \
-             to {}.",
-            if drones == 1 { "its windows" } else { "the flock" }
+             to {whose}.{bent}"
         )
     } else {
         "Colour tells the flights apart; dashed lines are the signed-quadratic law of each."
@@ -126,6 +134,15 @@ fn one_flight(panel: &mut Panel, flight: &FlightAnalysis, v: &Axis) {
             panel.entry(LawKind::Linear.name(), MUTED, LegendShape::Line, "7 4");
         }
     }
+    if let Some(line) = bent(flight) {
+        panel.line(&law::bent_curve(line), GREEN, 2.2, "2 3");
+        panel.entry("line that may bend", GREEN, LegendShape::Line, "2 3");
+    }
+}
+
+/// The line by which maps are made, where it differs from the straight one by more than chance.
+fn bent(flight: &FlightAnalysis) -> Option<&BentLine> {
+    flight.headline.as_ref()?.line.as_ref().filter(|line| line.is_bent())
 }
 
 fn several_flights(

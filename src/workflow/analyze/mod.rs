@@ -70,6 +70,13 @@ pub struct Analysing<'a> {
     doubts: Option<String>,
 }
 
+/// Doubts about the files, whose names count from the campaign: the page may be read elsewhere.
+fn file_doubts(work: &Work) -> impl Iterator<Item = String> {
+    let before = format!("{}/", work.root.shown());
+    let notes = work.flights.iter().flat_map(|flight| &flight.notes);
+    notes.map(move |note| note.replace(before.as_str(), ""))
+}
+
 impl<'a> Analysing<'a> {
     /// Prepares an analysis and reports to the host which logs are taken, with their doubts. `hold`
     /// is the analysis.json whose A and u0 are held.
@@ -129,7 +136,9 @@ impl<'a> Analysing<'a> {
         }
         progress.finish();
         analysis.warnings.extend(work.absent.iter().cloned().map(Warning::Failed));
-        analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
+        analysis
+            .warnings
+            .extend(doubts.into_iter().chain(file_doubts(work)).map(Warning::WhoseLogs));
         host.check_stop()?;
         let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
         Ok(Analysed {

@@ -10,5 +10,6 @@ mod serve;
 
 pub(crate) use self::air::{AirWatch, AirWish};
 pub(crate) use self::host::LiveHost;
+pub(crate) use self::recorded::recall;
 pub(crate) use self::replay::{ReplayWish, replay};
 pub(crate) use self::serve::{Address, LiveWish, Served, serve};

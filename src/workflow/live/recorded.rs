@@ -3,22 +3,50 @@
 
 use std::collections::BTreeMap;
 
+use crate::base::causes::with_causes;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::StartRecord;
 use crate::fleet::recorded::{Happened, Recorded, read};
 use crate::fleet::watch::Event;
 use crate::live::player::Track;
+use crate::live::station::Station;
 use crate::live::view::{Level, Said};
+use crate::mission::plan::Plan;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::host::Host;
 
 /// Preparations of a flight are no longer before its start is authorized, us.
 const PREPARED_US: u64 = 3_600_000_000;
+/// Drones come home so long after the end of their show at most, us.
+const LINGERING_US: u64 = 600_000_000;
 /// A flight is over so long after its start, us.
 const OVER_US: u64 = 6 * 3_600_000_000;
 /// Sentences that are shown, the last ones.
 const MOST_SAID: usize = 2000;
 /// Step of the station that begins a flight.
 const AUTHORIZED: &str = "authorized";
+
+/// Tells a page what the station said before it was started anew, as long as the flight that was started is not over.
+pub(crate) fn recall(host: &dyn Host, station: &Station, folder: &FlightFolder, plan: &Plan) {
+    match spoken(host.clock().unix_us(), folder, plan) {
+        Ok(said) => station.recall(said),
+        Err(error) => host.warn(&format!(
+            "{}; the page shows nothing of what was said before",
+            with_causes(&error, ": ")
+        )),
+    }
+}
+
+/// Sentences of a flight that is in the air at `now_us`; none of one that is over.
+fn spoken(now_us: u64, folder: &FlightFolder, plan: &Plan) -> Result<Vec<Said>, WorkflowError> {
+    let Some(start) = StartRecord::read(folder)? else { return Ok(Vec::new()) };
+    let zero_us = u64::try_from(start.start.to_unix_ms()).unwrap_or(0).saturating_mul(1000);
+    let long_us = plan.duration_ms.saturating_mul(1000);
+    if now_us > zero_us.saturating_add(long_us).saturating_add(LINGERING_US) {
+        return Ok(Vec::new());
+    }
+    Ok(OfJournal::of(&read(&folder.0)?, &start).said)
+}
 
 /// Journal of the latest start of a flight.
 #[derive(Debug, Default)]

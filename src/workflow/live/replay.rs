@@ -96,7 +96,7 @@ pub(crate) fn replay(
     let air = analysed.and_then(fleet_air);
     let player = Player::new(plan, Arc::clone(host.clock()), tracks, (air, said), wish.speed);
     let source: Arc<dyn Source> = Arc::new(player);
-    let served = serve(host, &wish.campaign, &source, live)?;
+    let served = serve(host, &wish.campaign, &wish.campaign, &source, live)?;
     Ok(Replayed { _served: served, flight: found.name.clone(), drones })
 }
 

@@ -65,12 +65,14 @@ pub(crate) struct Served {
     _server: Server,
 }
 
-/// Serves the page of a flight, and says where.
+/// Serves the page of a flight, and says where. `campaign` is the folder whose reports it links to, `folder` the one
+/// where its port and secrets are kept.
 ///
 /// # Errors
 /// If the address cannot be listened at.
 pub(crate) fn serve(
     host: &dyn Host,
+    campaign: &Path,
     folder: &Path,
     source: &Arc<dyn Source>,
     wish: &LiveWish,
@@ -91,6 +93,7 @@ pub(crate) fn serve(
         random: Box::new(wish.random),
         look: secrets.look.clone(),
         order: wish.orders.then(|| secrets.order.clone()),
+        campaign: Some(campaign.to_owned()),
     };
     let mut opened = Err(io::Error::from(io::ErrorKind::AddrNotAvailable));
     for port in ports {

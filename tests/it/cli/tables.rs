@@ -209,3 +209,36 @@ fn what_has_no_end_is_refused_and_what_never_begins_is_not_waited_for() {
     let mapping = bench.expect(1, &["analyze", "--csv", "ladder.csv", "--no-report"]);
     assert!(mapping.err.contains("it is not a file but a pipe"), "{mapping}");
 }
+
+#[test]
+fn a_local_time_tells_when_in_utc() {
+    let bench = Bench::new();
+    let dated: Vec<String> = table()
+        .into_iter()
+        .map(|row| match row.split_once(',') {
+            Some(("time", _)) => row,
+            Some((time_s, rest)) => {
+                let time_s: f64 = time_s.parse().unwrap();
+                let (minute, second) = (29 + (time_s / 60.0) as u32, time_s % 60.0);
+                format!("2021-04-20 09:{minute:02}:{second:06.3},{rest}")
+            }
+            None => unreachable!("a row without a comma"),
+        })
+        .collect();
+    fs::write(bench.path("ladder.csv"), dated.join("\n")).unwrap();
+    let start = |time: &str| {
+        let mapping = MAPPING.replace("format = \"s\"", time);
+        fs::write(bench.path("mapping.toml"), mapping).unwrap();
+        bench.expect(0, &["analyze", "--csv", "mapping.toml", "-o", "out"]);
+        let read = |file: &str| fs::read_to_string(bench.path("out").join(file)).unwrap();
+        let analysis: serde_json::Value = serde_json::from_str(&read("analysis.json")).unwrap();
+        (analysis["flights"][0]["drones"][0]["clock"]["start"].clone(), read("report/index.html"))
+    };
+    let (unknown, _) = start("format = \"datetime\"");
+    assert!(unknown.is_null(), "{unknown}");
+    // 2021-04-20 07:29:00 UTC: in GPS week 2154, two days, that time and the leap seconds.
+    let (known, page) = start("format = \"datetime\"\nutc_offset_h = 2");
+    let ms = (2 * 24 * 3600 + 7 * 3600 + 29 * 60 + 18) * 1000;
+    assert_eq!(known, serde_json::json!({"week": 2154, "tow_ms": ms}));
+    assert!(page.contains("2021-04-20") && page.contains("07:29"), "the page does not tell when");
+}

@@ -2,6 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -42,6 +43,11 @@ impl Source for Counted {
 }
 
 fn served() -> (Server, Arc<Counted>) {
+    served_beside(None)
+}
+
+/// A page whose campaign is in this folder.
+fn served_beside(campaign: Option<&Path>) -> (Server, Arc<Counted>) {
     let source = Arc::new(Counted(AtomicU64::new(0)));
     let of = Arc::clone(&source);
     let setup = Setup {
@@ -53,6 +59,7 @@ fn served() -> (Server, Arc<Counted>) {
         }),
         look: "look".to_owned(),
         order: Some("order".to_owned()),
+        campaign: campaign.map(Path::to_owned),
     };
     (Server::open("127.0.0.1:0".parse().unwrap(), setup).unwrap(), source)
 }
@@ -225,4 +232,49 @@ fn many_connections_at_once_are_refused_and_then_served_again() {
         get(server.address(), "/", "").starts_with("HTTP/1.1 200 ")
     });
     assert!(served);
+}
+
+#[test]
+fn reports_beside_the_flight_are_read_with_the_secret_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("report")).unwrap();
+    std::fs::write(folder.path().join("report/index.html"), "<h1>Report</h1>").unwrap();
+    std::fs::write(folder.path().join("fleet-live.json"), "secrets").unwrap();
+    let (server, counted) = served_beside(Some(folder.path()));
+    let address = server.address();
+    // The page is told of what is there.
+    let mut stream = connect(address);
+    stream
+        .write_all(format!("GET /events?token=look HTTP/1.1\r\nHost: {address}\r\n\r\n").as_bytes())
+        .unwrap();
+    let told = events(&mut stream, 2);
+    let link = r#"{"title":"The report","href":"/files/look/report/index.html"}"#;
+    assert!(told.contains(&format!("event: links\ndata: [{link}]")), "{told}");
+    // From a page in a sandbox, which is of no site, too.
+    for headers in ["", "Sec-Fetch-Site: cross-site\r\nOrigin: null\r\n"] {
+        let page = get(address, "/files/look/report/index.html", headers);
+        assert!(page.starts_with("HTTP/1.1 200 OK\r\n"), "{page}");
+        assert!(page.contains("Content-Type: text/html") && page.ends_with("<h1>Report</h1>"));
+        assert!(page.contains("Content-Security-Policy: sandbox allow-scripts"), "{page}");
+        assert!(page.contains("connect-src 'none'") && !page.contains("allow-same-origin"));
+    }
+    for (path, status) in [
+        ("/files/wrong/report/index.html", 401),
+        ("/files//report/index.html", 401),
+        // It may order: it is no address of a page that somebody passes on.
+        ("/files/order/report/index.html", 403),
+        ("/files/look/fleet-live.json", 404),
+        ("/files/look/report/../fleet-live.json", 404),
+        ("/files/look/report/%2e%2e/fleet-live.json", 404),
+        ("/files/look/report/", 404),
+        ("/files/look/", 404),
+    ] {
+        let answer = get(address, path, "");
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "{path}: {answer}");
+    }
+    let rebound = "GET /files/look/report/index.html HTTP/1.1\r\nHost: evil.example\r\n\r\n";
+    assert!(ask(address, rebound).starts_with("HTTP/1.1 403 "));
+    let post = format!("POST /files/look/report/index.html HTTP/1.1\r\nHost: {address}\r\n\r\n");
+    assert!(ask(address, &post).starts_with("HTTP/1.1 405 "));
+    drop((stream, counted));
 }

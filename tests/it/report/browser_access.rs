@@ -7,7 +7,12 @@ use std::path::Path;
 
 use crate::report::chromium::{Browser, Tab};
 use crate::report::synthetic::{posterior, provenance, whole_campaign};
-use updraft::report::{PageLink, Provenance, Report, render, render_gap, write};
+use updraft::analysis::result::Analysis;
+use updraft::compare::{LawChoice, Side, compare};
+use updraft::report::{
+    ComparedFiles, PageLink, Provenance, Report, render, render_comparison, render_gap,
+    render_study, write,
+};
 
 /// Headings that skip a level, as a list.
 const HEADINGS: &str = "(() => { let last = 0; const bad = []; \
@@ -60,9 +65,40 @@ fn linked(provenance: Provenance) -> Provenance {
     Provenance { links, analysis_sha256: Some("ab".repeat(32)), ..provenance }
 }
 
+/// Two campaigns side by side, the second with a weak drone.
+fn comparison() -> Report {
+    let side = |id: &str, analysis| Side {
+        id: id.to_owned(),
+        path: id.to_owned(),
+        analysis,
+        facts: Vec::new(),
+    };
+    let title = "The same fleet a day later".to_owned();
+    let mut later = Analysis { title, ..whole_campaign() };
+    let weak = later.flights[0].drones.get_mut(4).and_then(|drone| drone.laws.as_mut());
+    let linear = weak.and_then(|laws| laws.linear.as_mut()).expect("a drone with a law");
+    linear.parameters[1].estimate.value += 90.0;
+    let sides = [side("monday", whole_campaign()), side("tuesday", later)];
+    let found = compare(&sides, LawChoice::default(), "updraft").expect("a comparison");
+    let files = ComparedFiles {
+        links: vec![PageLink::there("Its report", "../../monday/report/index.html")],
+        circumstances: vec!["calibration: 2026-06-01 12:00:00 UTC".to_owned()],
+    };
+    render_comparison(&found, &provenance(), &[files.clone(), files]).expect("a page")
+}
+
+/// A simulation study of a few flights.
+fn study() -> Report {
+    let folder = tempfile::tempdir().expect("a folder");
+    let found = crate::study::support::result(&crate::study::support::small(), folder.path());
+    render_study(&found, &linked(provenance())).expect("a page")
+}
+
 /// Every page that is looked at, with its name and its address.
 fn pages() -> Vec<(&'static str, String)> {
-    let made: [(&str, Report); 2] = [
+    let made: [(&str, Report); 4] = [
+        ("compare", comparison()),
+        ("study", study()),
         ("report", render(&posterior(whole_campaign()), &linked(provenance())).expect("a report")),
         (
             "gap",
@@ -151,8 +187,9 @@ fn paper_holds_everything() {
 #[test]
 fn a_clicked_drone_is_not_under_the_bar() {
     let Some(mut browser) = Browser::start() else { return };
-    let (_, address) = pages().swap_remove(0);
-    let mut tab = browser.open(&address, [700, 900]);
+    let pages = pages();
+    let (_, address) = pages.iter().find(|(name, _)| *name == "report").expect("a report");
+    let mut tab = browser.open(address, [700, 900]);
     tab.less_motion();
     tab.click_on("a[data-drone$='drone-17']");
     tab.wait_for("document.querySelector('.gallery').getBoundingClientRect().top < 300");
