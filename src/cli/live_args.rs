@@ -31,7 +31,7 @@ pub(super) struct LiveArgs {
     /// Print a second address of the page, from which the start can be authorized and drones ordered down
     #[arg(long, requires = "live")]
     live_orders: bool,
-    /// The analysis.json with the calibration by which the page tells the air in a measurement flight
+    /// The campaign, or analysis.json, with the calibration by which the page tells the air in a measurement flight
     /// [default: the campaign's]
     #[arg(long, value_name = "FILE", requires = "live")]
     law: Option<PathBuf>,

@@ -4,21 +4,18 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
-use serde::Deserialize;
-
+use super::analysis_file::{AnalysisFile, analysis_of};
 use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{labels, stem};
 use super::host::Host;
 use super::made_by;
-use crate::analysis::result::{ANALYSIS_SCHEMA, Analysis, FlightAnalysis};
-use crate::base::digest::sha256;
-use crate::base::file::{FileError, read_whole, write_whole};
-use crate::base::parse;
+use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::start::StartRecord;
-use crate::campaign::{self, CampaignError, FlightFolder, is_campaign, to_json};
+use crate::campaign::{self, FlightFolder, is_campaign, to_json};
 use crate::compare::result::Comparison;
 use crate::compare::{FlightFacts, LawChoice, Side, compare};
 use crate::fleet::slots::FleetTable;
@@ -26,9 +23,6 @@ use crate::report::{self, ComparedFiles, InputFile, PageLink, Provenance};
 
 /// File of the numbers, in the folder of a comparison.
 pub const RESULT_FILE: &str = "compare.json";
-
-/// Largest analysis that is read, bytes; see the archive's.
-const MOST_ANALYSIS_BYTES: u64 = 4 << 30;
 
 /// Request for a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -183,64 +177,16 @@ fn refuse_twice(paths: &[PathBuf]) -> Result<(), WorkflowError> {
     Ok(())
 }
 
-/// Path of the analysis behind a path.
-fn analysis_of(path: &Path) -> PathBuf {
-    if path.is_dir() { path.join("analysis.json") } else { path.to_owned() }
-}
-
-/// The format's name alone.
-#[derive(Deserialize)]
-struct Head {
-    #[serde(default)]
-    schema: Option<String>,
-}
-
 /// Reads a campaign's analysis and what its records say of the drones.
 fn read(path: &Path, id: String) -> Result<(Side, InputFile), WorkflowError> {
-    std::fs::metadata(path).map_err(|error| FileError::new("read", path, error))?;
-    let file = analysis_of(path);
-    if path.is_dir() && !file.exists() {
-        return Err(WorkflowError::Nothing(format!(
-            "{} has no analysis.json: run `updraft analyze` on it",
-            path.shown()
-        )));
-    }
-    let bytes = read_whole(&file, MOST_ANALYSIS_BYTES)?;
-    let broken = |reason: String| CampaignError::Json { path: file.clone(), reason };
-    let head: Head = parse::json(&bytes).map_err(|error| broken(error.to_string()))?;
-    refuse_schema(&file, head.schema.as_deref())?;
-    let analysis: Analysis = parse::json(&bytes).map_err(|error| broken(error.to_string()))?;
+    let AnalysisFile { path: file, sha256, analysis } = AnalysisFile::read(path)?;
     let folder = if path.is_dir() { Some(path) } else { path.parent() };
     let facts = match folder.filter(|folder| is_campaign(folder)) {
         Some(folder) => facts(folder, &analysis)?,
         None => Vec::new(),
     };
-    let shown = file.shown().to_string();
-    let input = InputFile { path: shown, sha256: sha256(&bytes) };
+    let input = InputFile { path: file.shown().to_string(), sha256 };
     Ok((Side { id, path: path.shown().to_string(), analysis, facts }, input))
-}
-
-/// Refuses files of other kinds, and of a newer format, by its name.
-fn refuse_schema(file: &Path, schema: Option<&str>) -> Result<(), WorkflowError> {
-    let file = file.shown();
-    let Some(schema) = schema.filter(|schema| *schema != ANALYSIS_SCHEMA) else {
-        return match schema {
-            Some(_) => Ok(()),
-            None => Err(WorkflowError::Usage(format!("{file} is no analysis: it has no schema"))),
-        };
-    };
-    let version = |schema: &str| {
-        let (name, version) = schema.rsplit_once('/')?;
-        Some((name.to_owned(), version.parse::<u32>().ok()?))
-    };
-    let plain = crate::base::plain::plain(schema);
-    Err(WorkflowError::Usage(match (version(schema), version(ANALYSIS_SCHEMA)) {
-        (Some((name, theirs)), Some((own, ours))) if name == own && theirs > ours => format!(
-            "{file} was made by a newer updraft (\"{plain}\"; this one reads \"{ANALYSIS_SCHEMA}\"): use that one, or \
-             analyse the campaign again"
-        ),
-        _ => format!("{file} is no analysis: its schema is \"{plain}\", not \"{ANALYSIS_SCHEMA}\""),
-    }))
 }
 
 /// What the records of a campaign say of each analysed flight.
@@ -298,16 +244,5 @@ mod tests {
         std::fs::write(&file, "{}").unwrap();
         assert_eq!(way(&output, &file).unwrap(), "../../mon%20day%231/analysis.json");
         assert_eq!(way(&output, &campaign.join("none")), None);
-    }
-
-    #[test]
-    fn other_formats_are_refused_by_their_name() {
-        let told = |schema: Option<&str>| {
-            refuse_schema(Path::new("a.json"), schema).map_err(|error| error.to_string())
-        };
-        assert_eq!(told(Some(ANALYSIS_SCHEMA)), Ok(()));
-        assert!(told(Some("updraft.analysis/2")).unwrap_err().contains("newer updraft"));
-        assert!(told(Some("updraft.plan/1")).unwrap_err().contains("is no analysis"));
-        assert!(told(None).unwrap_err().contains("no schema"));
     }
 }

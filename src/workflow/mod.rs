@@ -31,6 +31,7 @@
 //! # }
 //! ```
 
+mod analysis_file;
 pub mod analyze;
 pub mod archive;
 pub mod basemap;

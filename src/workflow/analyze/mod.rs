@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use self::fields::{read_study, write_fields};
 pub use self::gather::{Request, gather, load_plan};
 pub use self::settings::{Files, Settings, Uncorrected};
+use super::analysis_file::AnalysisFile;
 use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{Found, Work, find, lean_tables};
@@ -351,7 +352,7 @@ fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<PathBuf, Workflow
 
 /// The calibration whose A and u0 are held.
 fn read_reference(path: &Path) -> Result<FlightAnalysis, WorkflowError> {
-    let analysis: Analysis = campaign::read_json(path)?;
+    let AnalysisFile { analysis, .. } = AnalysisFile::read(path)?;
     analysis
         .flights
         .into_iter()

@@ -12,13 +12,13 @@ use std::time::Duration;
 use super::agreement::{Agreement, Look};
 use super::of_map;
 use crate::analysis::battery::Sag;
-use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{FlightAnalysis, UpdraftMap};
 use crate::analysis::{AtHand, LogInput, analyze_flight};
 use crate::base::causes::with_causes;
 use crate::base::estimate::Estimate;
 use crate::base::plain::Shown as _;
+use crate::campaign::FlightFolder;
 use crate::campaign::origin::LogOrigin;
-use crate::campaign::{FlightFolder, read_json};
 use crate::live::station::Station;
 use crate::live::view::{AirView, Level, Step};
 use crate::mission::Plan;
@@ -26,6 +26,7 @@ use crate::mission::plan::{Purpose, SegmentKind};
 use crate::numeric;
 use crate::vehicle::library;
 use crate::virtual_fleet::vehicle::REVISION;
+use crate::workflow::analysis_file::AnalysisFile;
 use crate::workflow::analyze::Settings;
 use crate::workflow::analyze::one_input;
 use crate::workflow::clock::{Clock, Micros, S};
@@ -226,7 +227,7 @@ impl Shared {
 }
 
 fn calibration(path: &Path) -> Result<Option<FlightAnalysis>, WorkflowError> {
-    let analysis: Analysis = read_json(path)?;
+    let AnalysisFile { analysis, .. } = AnalysisFile::read(path)?;
     let usable =
         |flight: &FlightAnalysis| flight.purpose == Purpose::Calibration && flight.flock.is_some();
     Ok(analysis.flights.into_iter().find(usable))
