@@ -30,7 +30,8 @@ use super::refer::refer_calibration;
 use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    LevelledMap, TableRow, Unmeasured, UpdraftMap, WindCorrection, WindLegs, WindowStats,
+    LevelledMap, TableRow, Turbulence, Unmeasured, UpdraftMap, WindCorrection, WindLegs,
+    WindowStats,
 };
 use super::site::FlightSite;
 use super::slots::{SlotMatch, match_slots};
@@ -39,6 +40,7 @@ use super::statistics::result::FieldStatistics;
 use super::table::{self, PaperTable, TableLaw};
 use super::track;
 use super::truth;
+use super::turbulence;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
 use super::wind_forms::{Belief, WindForms};
@@ -349,7 +351,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         Beside::add(map, seen.iter().map(|seen| &seen.beside));
     }
     let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
-    if let Some((map, modelled)) = map.as_mut().zip(modelled) {
+    if let Some((map, modelled)) = map.as_mut().zip(modelled).filter(|_| options.posterior) {
         posterior::add(
             map,
             modelled,
@@ -357,6 +359,8 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
             statistics.as_ref().and_then(|found| found.wind.as_ref()),
         );
     }
+    let turbulence =
+        map.as_ref().and_then(|map| turbulence_of(shared, (map, &seen), statistics.as_ref()));
     let wind_legs = input.plan.and_then(|plan| WindLegs::of(plan, &drones));
     FlightAnalysis {
         name: input.name.to_owned(),
@@ -377,6 +381,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         table: laws.table,
         map,
         statistics,
+        turbulence,
         wind_legs,
         unmeasured,
         paper_table: laws.paper,
@@ -548,6 +553,27 @@ fn statistics(
         true_air: input.true_air.cloned(),
         ..of_map(map, seen, &options.statistics, shared.drag())
     })
+}
+
+/// Turbulence over a map's hover; `None` where drones moved.
+fn turbulence_of(
+    shared: &Shared<'_>,
+    (map, seen): (&UpdraftMap, &[HoverSeen]),
+    statistics: Option<&FieldStatistics>,
+) -> Option<Turbulence> {
+    let known = map.drones.iter().zip(seen);
+    let drones: Vec<turbulence::Drone<'_>> = known
+        .filter_map(|(drone, seen)| {
+            let (slot, name, place_m) = (drone.slot, drone.name.as_str(), drone.position_m);
+            Some(turbulence::Drone { slot, name, place_m, records: seen.records.as_ref()? })
+        })
+        .collect();
+    let asked = turbulence::Asked {
+        orientation_deg: shared.input.plan.map(|plan| plan.site.orientation_deg),
+        wind: statistics.and_then(|found| found.wind.as_ref()),
+        drag_share: shared.drag().share(),
+    };
+    turbulence::of_fleet(&drones, asked)
 }
 
 /// The table of the paper to compare a calibration with. Table II is one of a fleet in the field: a

@@ -176,14 +176,7 @@ impl<'a> Aware<'a> {
         slot: Option<u16>,
         name: &str,
     ) -> Result<Measured, Cause> {
-        let found = same_drone(self.reference, slot, name);
-        let index = found
-            .and_then(|found| self.reference.drones.iter().position(|d| std::ptr::eq(d, found)));
-        let own = index.and_then(|index| self.zero.drones.get(index)?.as_ref());
-        let law = own.unwrap_or(&self.zero.flock);
-        let pack = found.and_then(|drone| pack_of(drone, self.battery)).or_else(|| {
-            self.reference.drones.iter().find_map(|drone| pack_of(drone, self.battery))
-        });
+        let (own, law, pack) = self.law_of(slot, name);
         let slow = Slow::of(flight);
         let pack = pack.filter(|_| slow.is_some());
         let values = Values { shape: self.zero.shape, law, zero: &self.zero };
@@ -194,8 +187,7 @@ impl<'a> Aware<'a> {
         let referred: Vec<Option<(Referred, Raw)>> =
             hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
         let sigmas = self.corrections.sigmas(pack.as_ref());
-        let mut measured =
-            Measured { first_s: hover.first_s, is_own: own.is_some(), ..Measured::default() };
+        let mut measured = Measured { first_s: hover.first_s, is_own: own, ..Measured::default() };
         let known = self.seconds(&mut measured, &referred, &values, hover, &sigmas);
         if known.is_empty() {
             return Err(hover.nothing());
@@ -204,6 +196,65 @@ impl<'a> Aware<'a> {
         measured.quality.clone_from(&hover.quality);
         measured.quality.extend(self.doubtful(hover, &known, &referred, pack.as_ref()));
         Ok(measured)
+    }
+
+    /// Whether a drone has a law of its own, the law that speaks for it, and its battery in the calibration.
+    fn law_of(&self, slot: Option<u16>, name: &str) -> (bool, &DroneLaw, Option<Pack>) {
+        let found = same_drone(self.reference, slot, name);
+        let index = found
+            .and_then(|found| self.reference.drones.iter().position(|d| std::ptr::eq(d, found)));
+        let own = index.and_then(|index| self.zero.drones.get(index)?.as_ref());
+        let law = own.unwrap_or(&self.zero.flock);
+        let pack = found.and_then(|drone| pack_of(drone, self.battery)).or_else(|| {
+            self.reference.drones.iter().find_map(|drone| pack_of(drone, self.battery))
+        });
+        (own.is_some(), law, pack)
+    }
+
+    /// Vertical air speed, m/s, by other means of a log than those of the map's seconds; and the relative standard error
+    /// of its scale from what wind does to the pulse's slope.
+    pub(super) fn values_of(
+        &self,
+        flight: &Flight,
+        means: &[Option<Second>],
+        slot: Option<u16>,
+        name: &str,
+    ) -> (Vec<Option<f64>>, f64) {
+        let (_, law, pack) = self.law_of(slot, name);
+        let slow = Slow::of(flight);
+        let pack = pack.filter(|_| slow.is_some());
+        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
+        let value = |second: &Second| {
+            let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
+            let (one, _) = self.refer(second, resting_v, pack.as_ref(), &values);
+            Some(one.velocity_mps - values.air_mps(one.pulse_us)?)
+        };
+        let found = means.iter().map(|second| second.as_ref().and_then(value)).collect();
+        (found, self.doubted_slope(means, &values))
+    }
+
+    /// Relative standard error of the pulse's slope from what wind does to it: a wind's change of the pulse depends on the
+    /// climb as well.
+    fn doubted_slope(&self, means: &[Option<Second>], values: &Values<'_>) -> f64 {
+        let over =
+            |of: fn(&Second) -> f64| mean(means.iter().flatten().map(of)).unwrap_or_default();
+        let raw = |climb_mps: f64| Raw {
+            time_s: over(|second| second.time_s),
+            pulse_us: over(|second| second.pulse_us),
+            velocity_mps: climb_mps,
+            climb_mps,
+            lean_deg: over(|second| second.lean_deg),
+            height_m: over(|second| second.height_m),
+            resting_v: None,
+        };
+        let doubts =
+            |climb_mps: f64| self.corrections.refer(&raw(climb_mps), None, self.slope).doubts_us;
+        let (up, down) = (doubts(0.5), doubts(-0.5));
+        let sigmas = self.corrections.sigmas(None);
+        let of = |doubt: usize| sigmas[doubt] * (up[doubt] - down[doubt]);
+        let slope = values.slope(STEEP_MPS);
+        let change = WINDS.into_iter().fold(0.0, |sum: f64, wind| sum.hypot(of(wind)));
+        if slope > 0.0 { (change / slope).min(MOST_SLOPE_SHARE) } else { 0.0 }
     }
 
     /// A second with what is known besides the vertical air speed taken away, and as it was logged.

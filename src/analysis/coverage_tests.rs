@@ -185,6 +185,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         utc_offset_h: None,
         simulated: false,
         statistics: None,
+        turbulence: None,
         wind_legs: None,
         name: String::new(),
         purpose: Purpose::Calibration,

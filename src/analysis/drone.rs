@@ -19,6 +19,7 @@ use super::statistics::tilt_wind::LeanDrag;
 use super::stats::mean_sd;
 use super::steps::steady;
 use super::track;
+use super::turbulence::Records;
 use super::updraft::{self, DroneSeries, Lean};
 use super::warning::Warning;
 use super::windows::{self, Corrected, Target};
@@ -159,6 +160,9 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     };
     let mut hover = HoverSeen::of(flight, &corrected, &of_air);
     hover.beside = beside;
+    if let Some(Ok((series, _))) = &updraft {
+        hover.records = Records::of(shared, flight, series, (number, &drone.name));
+    }
     let truth = true_air(flight, &of_air);
     let first_fix_deg = flight.first_fix_deg;
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, first_fix_deg, truth })

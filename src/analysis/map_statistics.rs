@@ -8,6 +8,7 @@ use super::statistics::baseline::baseline;
 use super::statistics::result::FieldStatistics;
 use super::statistics::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
 use super::statistics::{FieldInput, StatisticsOptions, field_statistics};
+use super::turbulence::Records;
 use super::updraft;
 use super::windows::{Corrected, Target};
 use crate::flight::{Flight, Series};
@@ -29,6 +30,8 @@ pub(super) struct HoverSeen {
     heading_deg: Option<f64>,
     /// What its log tells beside the vertical air speed.
     pub(super) beside: Beside,
+    /// Its air in fractions of seconds; absent: its log does not tell.
+    pub(super) records: Option<Records>,
 }
 
 impl HoverSeen {
@@ -51,6 +54,7 @@ impl HoverSeen {
             forward_right: forward_right(flight, hover),
             heading_deg: heading_deg(flight, hover),
             beside: Beside::default(),
+            records: None,
         }
     }
 }

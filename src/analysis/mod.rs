@@ -62,6 +62,7 @@ pub mod thermal;
 pub mod together;
 mod track;
 mod truth;
+pub mod turbulence;
 pub mod updraft;
 mod warning;
 pub mod wind;

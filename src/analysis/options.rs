@@ -34,6 +34,9 @@ pub struct AnalysisOptions {
     /// Whether the estimate is the paper's own: the laws of the tables are inverted second by second, drone by
     /// drone. Else the map's calibration law knows about slow air, and the map has errors with their origins.
     pub plain: bool,
+    /// Whether the map is also made as one estimate of all drones and seconds together, which takes most of the time of an
+    /// analysis; without it there is no air between the drones, and there are no thermals.
+    pub posterior: bool,
     /// Largest number of points of a trace for figures.
     pub trace_points: usize,
 }
@@ -72,6 +75,7 @@ impl Default for AnalysisOptions {
             paper: None,
             statistics: StatisticsOptions::default(),
             plain: false,
+            posterior: true,
             trace_points: 1200,
         }
     }

@@ -25,6 +25,7 @@ pub use super::stats::SampleStats;
 use super::table::PaperTable;
 pub use super::table::TableRow;
 pub use super::thermal::Thermal;
+pub use super::turbulence::result::*;
 use super::warning::Warning;
 use super::wind::Leaning;
 pub use super::wind_legs::{WindLeg, WindLegs};
@@ -103,6 +104,9 @@ pub struct FlightAnalysis {
     /// Statistics of the map: scales of the air in space and time, wind, averaging times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub statistics: Option<FieldStatistics>,
+    /// Turbulence over the hover of a map; absent: drones moved, or their logs or the calibration do not allow it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turbulence: Option<Turbulence>,
     /// Horizontal legs of known ground speed: what they tell of drag and lift in wind. Absent: none were
     /// flown.
     #[serde(default, skip_serializing_if = "Option::is_none")]

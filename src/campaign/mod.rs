@@ -377,6 +377,11 @@ pub fn fields_grid_netcdf(folder: &Path, flight: Option<&str>) -> PathBuf {
     folder.join("fields").join(name)
 }
 
+/// Path of a table of turbulence as CSV, in the folder of an analysis.
+pub fn fields_turbulence(folder: &Path, stem: &str) -> PathBuf {
+    folder.join("fields").join(format!("{stem}.csv"))
+}
+
 /// Path of the drones on a map as GeoJSON, in the folder of an analysis.
 pub fn fields_geojson(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft.geojson")

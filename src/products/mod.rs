@@ -1,4 +1,4 @@
-//! Files for other programs: the measured fields of an analysis as tables, as NetCDF by the CF conventions, and on
+//! Files for other programs: the measured fields and the turbulence of an analysis as tables, as NetCDF by the CF conventions, and on
 //! maps (KML, GeoJSON).
 //!
 //! All are pure functions of the analysis and of its [`Origin`]: equal input gives equal bytes. Quantities, formulas and
@@ -13,6 +13,7 @@ pub mod kml;
 #[cfg(feature = "netcdf")]
 pub mod netcdf;
 mod on_map;
+pub mod turbulence;
 mod where_when;
 mod words;
 

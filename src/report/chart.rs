@@ -67,7 +67,8 @@ pub(super) struct Panel {
     bars: Vec<(Vec<Mark>, String)>,
     shapes: Vec<Shape>,
     front_shapes: Vec<Shape>,
-    log_x: bool,
+    /// Whether the axes, x and y, are logarithmic.
+    log: [bool; 2],
     legend: Vec<LegendEntry>,
     legend_position: LegendPosition,
     legend_box: bool,
@@ -87,7 +88,7 @@ impl Panel {
             bars: Vec::new(),
             shapes: Vec::new(),
             front_shapes: Vec::new(),
-            log_x: false,
+            log: [false; 2],
             legend: Vec::new(),
             legend_position: LegendPosition::InsideTopLeft,
             legend_box: true,
@@ -188,7 +189,13 @@ impl Panel {
 
     /// A logarithmic x axis.
     pub(super) fn logarithmic_x(&mut self) {
-        self.log_x = true;
+        self.log[0] = true;
+    }
+
+    /// Makes both axes logarithmic: the y axis must end on powers of ten. The legend stays where it is put.
+    pub(super) fn logarithmic(&mut self) {
+        self.log = [true; 2];
+        self.settled = true;
     }
 
     /// Draws the panel into a scene of this size, pixels.
@@ -200,12 +207,14 @@ impl Panel {
         let mut title_at = (self.title.clone(), LEFT_MARGIN);
         if format.is_print() {
             let frame = width - LEFT_MARGIN - self.right_margin;
-            if !self.log_x {
+            if !self.log[0] {
                 with_room_for_labels(&mut self.x, frame);
             }
             self.x.label = fitting(&self.x.label, 2.0 * (width - LEFT_MARGIN - frame / 2.0));
             self.y.label = fitting(&self.y.label, height);
-            with_room_between(&mut self.y, height - TOP_MARGIN - BOTTOM_MARGIN);
+            if !self.log[1] {
+                with_room_between(&mut self.y, height - TOP_MARGIN - BOTTOM_MARGIN);
+            }
             title_at = title(&self.title, LEFT_MARGIN, width, f64::from(TITLE));
         }
         self.settle([width, height]);
@@ -218,9 +227,7 @@ impl Panel {
             .with_x_axis_max(self.x.max)
             .with_y_axis_min(self.y.min)
             .with_y_axis_max(self.y.max)
-            .with_y_tick_step(self.y.step)
             .with_x_tick_format(self.x.format())
-            .with_y_tick_format(self.y.format())
             .with_force_margins(LEFT_MARGIN, self.right_margin)
             .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
             .with_label_size(13)
@@ -229,7 +236,12 @@ impl Panel {
             .with_font_family(FONT)
             .with_theme(theme());
         layout =
-            if self.log_x { layout.with_log_x() } else { layout.with_x_tick_step(self.x.step) };
+            if self.log[0] { layout.with_log_x() } else { layout.with_x_tick_step(self.x.step) };
+        layout = if self.log[1] {
+            layout.with_log_y()
+        } else {
+            layout.with_y_tick_step(self.y.step).with_y_tick_format(self.y.format())
+        };
         if !self.legend.is_empty() {
             layout = layout
                 .with_legend_entries(self.legend)
@@ -291,7 +303,7 @@ impl Panel {
         let share = |value: f64, low: f64, high: f64| (value - low) / (high - low);
         let place = |[at_x, at_y]: [f64; 2]| {
             let (x, y) = (&self.x, &self.y);
-            let across = if self.log_x {
+            let across = if self.log[0] {
                 share(at_x.ln(), x.min.ln(), x.max.ln())
             } else {
                 share(at_x, x.min, x.max)

@@ -69,6 +69,7 @@ mod table;
 mod terminal;
 mod text;
 mod tracks;
+mod turbulence_page;
 mod typographic;
 mod vendor;
 
@@ -94,6 +95,7 @@ pub use study_page::render_study;
 pub use study_terminal::study_summary;
 pub use terminal::terminal_summary;
 pub use text::NO_EDGE;
+pub use turbulence_page::{TURBULENCE_PAGE, render_turbulence};
 
 /// Name of the page in the report's folder.
 pub const PAGE_FILE: &str = "index.html";
@@ -222,6 +224,15 @@ pub fn render_with_study(
 ///
 /// If the folder or a file cannot be written.
 pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
+    write_named(report, folder, PAGE_FILE)
+}
+
+/// [`write()`] of a page of another name beside the report.
+///
+/// # Errors
+///
+/// If the folder or a file cannot be written.
+pub fn write_named(report: &Report, folder: &Path, page: &str) -> Result<(), ReportError> {
     let figures = folder.join(FIGURES_FOLDER);
     for (name, svg) in &report.figures {
         write_whole(&figures.join(format!("{name}.svg")), svg.as_bytes())?;
@@ -229,6 +240,6 @@ pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     for (name, script) in &report.data {
         write_whole(&folder.join(DATA_FOLDER).join(format!("{name}.js")), script.as_bytes())?;
     }
-    write_whole(&folder.join(PAGE_FILE), report.html.as_bytes())?;
+    write_whole(&folder.join(page), report.html.as_bytes())?;
     Ok(())
 }

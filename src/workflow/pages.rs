@@ -7,7 +7,7 @@ use crate::analysis::result::Analysis;
 use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::products::{self, fields, fields_grid};
-use crate::report::{PAGE_FILE, PageLink};
+use crate::report::{PAGE_FILE, PageLink, TURBULENCE_PAGE};
 
 /// Page of a report, of a comparison and of a study, from their folder.
 const PAGE: &str = "report";
@@ -30,6 +30,7 @@ pub(super) fn of_report(root: &Path, folder: &Path, analysis: &Analysis) -> Vec<
         ));
     }
     links.extend(netcdf(folder, analysis));
+    links.extend(turbulence(folder, analysis));
     if products::has_map(analysis) {
         for (title, path) in [
             ("The drones on a map, for Google Earth (KML)", campaign::fields_kml(folder)),
@@ -62,6 +63,44 @@ pub(super) fn of_report(root: &Path, folder: &Path, analysis: &Analysis) -> Vec<
         "",
         format!("updraft live {named}"),
     ));
+    links
+}
+
+/// The page and the tables of turbulence.
+fn turbulence(folder: &Path, analysis: &Analysis) -> Vec<PageLink> {
+    let mut links = Vec::new();
+    if analysis.flights.iter().any(|flight| flight.turbulence.is_some()) {
+        links.push(PageLink::there("Turbulence", TURBULENCE_PAGE));
+    }
+    if products::turbulence::any(analysis) {
+        let table = products::turbulence::Table::Quantities;
+        let path = campaign::fields_turbulence(folder, table.stem());
+        links.push(PageLink::there("Turbulence as tables", relative(folder, &path)));
+    }
+    links
+}
+
+/// Links of the page of turbulence, which lies beside the report in `folder`.
+pub(super) fn of_turbulence(folder: &Path, analysis: &Analysis) -> Vec<PageLink> {
+    let mut links = vec![PageLink::there("The report", PAGE_FILE)];
+    if products::turbulence::any(analysis) {
+        for (title, table) in [
+            (
+                "Quantities with their intervals, as a table",
+                products::turbulence::Table::Quantities,
+            ),
+            ("Spectra, as a table", products::turbulence::Table::Spectra),
+            ("Covariance by distance and lag, as a table", products::turbulence::Table::Pairs),
+            (
+                "Coherence by distance and frequency, as a table",
+                products::turbulence::Table::Coherence,
+            ),
+        ] {
+            let path = campaign::fields_turbulence(folder, table.stem());
+            links.push(PageLink::there(title, relative(folder, &path)));
+        }
+    }
+    links.push(PageLink::there("All numbers", "../analysis.json"));
     links
 }
 

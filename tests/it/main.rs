@@ -25,4 +25,5 @@ mod report;
 mod skybrush_server;
 mod statistics;
 mod study;
+mod turbulence;
 mod virtual_fleet;

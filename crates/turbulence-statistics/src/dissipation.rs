@@ -101,7 +101,7 @@ impl std::fmt::Display for NoRange {
             Self::Slope { slope, se } => {
                 write!(
                     f,
-                    "the spectrum falls with a slope of {slope:.2} +- {:.2} there, not -5/3",
+                    "the spectrum falls with a slope of {slope:.2} ± {:.2} there, not -5/3",
                     WIDTH * se
                 )
             }

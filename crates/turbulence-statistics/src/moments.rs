@@ -138,8 +138,9 @@ impl Known {
 }
 
 impl Moment {
-    /// A variance with the interval that its random error gives.
-    fn of_variance(
+    /// A variance with the interval that its random error gives, a relative error of the scale of values, and what the
+    /// record's mean took of it with the integral time.
+    pub fn of_variance(
         value: f64,
         random: f64,
         scale_se: f64,

@@ -33,8 +33,18 @@ pub struct Instrument {
     pub noise: f64,
     /// Relative standard error of the scale of values.
     pub scale_se: f64,
+    /// Relative standard error of the response's power, in each band for itself.
+    pub response_se: f64,
     /// Highest frequency that is told, Hz; 0: a quarter of the sampling frequency.
     pub highest_hz: f64,
+}
+
+impl Instrument {
+    /// Degrees of freedom of a density, so many by its sampling alone, with the error of the response: that of a mean over n
+    /// degrees of freedom is `sqrt(2/n)`.
+    fn freedom(&self, sampled: f64) -> f64 {
+        1.0 / (1.0 / sampled + 0.5 * self.response_se.powi(2))
+    }
 }
 
 /// Spectral density in a band of frequencies.
@@ -241,7 +251,7 @@ pub fn mean(records: &[&Record], instrument: &Instrument) -> Vec<Band> {
         let independent = if known { independent(sum, count) } else { of_lowest };
         let frequency_hz = sum.frequency / sum.lines;
         let noise = noise_density(first, instrument, frequency_hz);
-        let freedom = sum.freedom * independent;
+        let freedom = instrument.freedom(sum.freedom * independent);
         band(frequency_hz, density(sum), noise, freedom, instrument.scale_se)
     };
     sums.iter().map(one).collect()

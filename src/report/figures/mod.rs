@@ -17,3 +17,4 @@ pub(super) mod posterior;
 pub(super) mod sensitivity;
 pub(super) mod study;
 pub(super) mod track;
+pub(super) mod turbulence;

@@ -9,7 +9,7 @@ use crate::analysis::result::Analysis;
 use crate::base::file::write_with;
 use crate::base::plain::Shown as _;
 use crate::campaign;
-use crate::products::{Origin, fields, fields_grid, geojson, kml};
+use crate::products::{Origin, fields, fields_grid, geojson, kml, turbulence};
 use crate::report::Provenance;
 use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
 use crate::workflow::error::WorkflowError;
@@ -43,6 +43,7 @@ pub(super) fn write_fields(
     } else {
         remove(&[csv, parquet]);
     }
+    write_turbulence(analysis, folder)?;
     write_netcdf(host, (analysis, &origin), folder, wish)?;
     text(&campaign::fields_geojson(folder), geojson::geojson(analysis))?;
     text(&campaign::fields_kml(folder), kml::kml(analysis))
@@ -58,6 +59,19 @@ fn origin(provenance: &Provenance, wish: &Files) -> Origin {
         inputs: inputs.collect(),
         analysis_sha256: provenance.analysis_sha256.clone(),
     }
+}
+
+/// Writes the tables of turbulence, or removes those of an earlier analysis.
+fn write_turbulence(analysis: &Analysis, folder: &Path) -> Result<(), WorkflowError> {
+    for table in turbulence::Table::ALL {
+        let path = campaign::fields_turbulence(folder, table.stem());
+        if turbulence::any(analysis) {
+            write_with(&path, |out| turbulence::write_csv(analysis, table, out))?;
+        } else {
+            remove(&[path]);
+        }
+    }
+    Ok(())
 }
 
 /// Writes a text, or removes that of an earlier analysis.

@@ -274,6 +274,7 @@ impl Analysed {
             || {
                 let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
                 let made = report::render_with(&self.analysis, beside, &provenance)?;
+                self.write_turbulence(folder, &report_folder, &provenance)?;
                 Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
             },
             || write_fields(host, (&self.analysis, &provenance), folder, &self.files),
@@ -281,6 +282,24 @@ impl Analysed {
         page_made.and(fields_made)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
+    }
+
+    /// Writes the page of turbulence, or removes that of an earlier analysis.
+    fn write_turbulence(
+        &self,
+        folder: &Path,
+        report_folder: &Path,
+        provenance: &Provenance,
+    ) -> Result<(), WorkflowError> {
+        let links = pages::of_turbulence(folder, &self.analysis);
+        let provenance = Provenance { links, ..provenance.clone() };
+        if let Some(made) = report::render_turbulence(&self.analysis, &provenance)? {
+            report::write_named(&made, report_folder, report::TURBULENCE_PAGE)?;
+        } else {
+            // Nothing to remove is the usual case.
+            let _ = std::fs::remove_file(report_folder.join(report::TURBULENCE_PAGE));
+        }
+        Ok(())
     }
 
     /// Writes the figures of the report as papers print them.

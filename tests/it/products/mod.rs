@@ -4,4 +4,4 @@ mod fields;
 mod firmware;
 mod maps;
 mod netcdf;
-mod support;
+pub(crate) mod support;

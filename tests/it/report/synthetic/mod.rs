@@ -172,6 +172,7 @@ pub(crate) fn calibration(
         map: None,
         unmeasured: Vec::new(),
         statistics: None,
+        turbulence: None,
         wind_legs: None,
         paper_table: Some(PaperTable::Simulation),
     }
@@ -509,6 +510,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             ),
         }],
         statistics: None,
+        turbulence: None,
         wind_legs: None,
         paper_table: None,
         map: Some(UpdraftMap {

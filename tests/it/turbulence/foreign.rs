@@ -1,0 +1,52 @@
+//! Turbulence in foreign worlds, whose plant shares no physics with the simulator.
+
+#![expect(clippy::unwrap_used, reason = "this is test code")]
+
+use super::support::{Fleet, analysed, median, wilson};
+use updraft::analysis::result::Turbulence;
+use updraft::blind::worlds::maps;
+use updraft::workflow::find::{Work, find};
+
+const SEEDS: std::ops::Range<u64> = 2101..2113;
+
+fn flown(seed: u64) -> Turbulence {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("turbulent");
+    let fleet = Fleet { side: 3, spacing_m: 15.0, hover_s: 600.0 };
+    maps::fly(&fleet.plan(&root), "turbulent", seed, None, None).unwrap();
+    let mut work = Work::new(&root);
+    find(&root, None, &mut work).unwrap();
+    analysed(&work).pop().unwrap()
+}
+
+#[test]
+fn a_foreign_plants_turbulence_is_measured() {
+    let found: Vec<Turbulence> = SEEDS.map(flown).collect();
+    // A field of 0.4 m/s and own gusts of 0.3 m/s.
+    let truth = 0.25;
+    let variances: Vec<_> =
+        found.iter().filter_map(|one| one.vertical.as_ref()?.variance).collect();
+    let off = median(variances.iter().map(|of| of.value / truth).collect());
+    let inside = variances.iter().filter(|of| of.low <= truth && truth <= of.high).count();
+    let [low, high] = wilson(inside, variances.len());
+    println!(
+        "var(w)/truth: median {off:.3}, inside {inside} of {}, {low:.2} to {high:.2}",
+        variances.len()
+    );
+    assert!((off - 1.0).abs() < 0.1, "{off}");
+    assert!(high >= 0.91, "{inside} of {}", variances.len());
+
+    let mut off = Vec::new();
+    for at in found.iter().flat_map(|one| &one.distances) {
+        // Along and across the drift alike, over the time of the record.
+        let truth = 0.16 * (-0.5 * (at.distance_m / 25.0).powi(2)).exp();
+        off.push((at.covariance.value - truth).abs());
+    }
+    println!("covariance off by {:.3} (median) of {}", median(off.clone()), off.len());
+    assert!(median(off) < 0.05);
+
+    let speeds: Vec<f64> =
+        found.iter().filter_map(|one| Some(one.advection?.speed_mps.value / 3.0)).collect();
+    println!("advection: {speeds:.2?}");
+    assert!(speeds.len() >= 8 && (median(speeds) - 1.0).abs() < 0.15);
+}
