@@ -29,6 +29,7 @@
 //! * [`gap`]: which physics a simulation lacks, by measured logs.
 //! * [`blind`]: flights with hidden physics that test it.
 //! * [`compare`]: campaigns side by side, with tests of what differs.
+//! * [`mast`]: a campaign beside a mast.
 //! * [`products`]: the measured fields for other programs: tables, NetCDF, maps.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`archive`]: many campaigns as one Parquet dataset.
@@ -59,6 +60,7 @@ pub use multirotor_sim::{effects, sim, vehicle};
 pub use skybrush_show as show;
 pub use skybrush_show::check;
 pub mod live;
+pub mod mast;
 pub mod mission;
 pub mod numeric;
 pub mod products;

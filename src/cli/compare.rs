@@ -1,6 +1,6 @@
-//! `updraft compare`: campaigns side by side.
+//! `updraft compare`: campaigns side by side, or beside a mast.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
@@ -12,6 +12,7 @@ use crate::compare::LawChoice;
 use crate::report;
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::compare::{Request, run as compare};
+use crate::workflow::mast;
 use crate::workflow::paper::Shown;
 
 /// Width of the terminal summary, columns: at most, and at least.
@@ -25,6 +26,7 @@ const MIN_WIDTH: usize = 60;
   updraft compare monday tuesday wednesday -o week     # each against the first, with a report
   updraft compare old/analysis.json new/analysis.json --law linear
   updraft compare monday tuesday --json | jq '.laws[].drones[] | select(.is_changed)'
+  updraft compare monday --mast tower.csv -o beside    # its map beside an instrument (docs/mast.md)
 
 Says whether the fleet as a whole changed (air density, battery, temperature, air during a calibration),
 and which drones changed by more than the fleet: a weak motor, a propeller, weight. Drones are known by
@@ -37,9 +39,13 @@ Exit code 3: done, but something that both have could not be compared, and is na
 campaigns have no flight in common, or nothing can be compared.")]
 pub(super) struct CompareArgs {
     /// Analysed campaigns, folders with an analysis.json, or such files; the first is the reference
-    #[arg(value_name = "CAMPAIGN", required = true, num_args = 2..)]
+    #[arg(value_name = "CAMPAIGN", required = true, num_args = 1..)]
     campaigns: Vec<PathBuf>,
-    /// Folder for compare.json and report/index.html [default: nothing is written]
+    /// Record of a mast to compare one campaign with: a table with the columns utc and w, or a description of one (TOML;
+    /// docs/mast.md)
+    #[arg(long, value_name = "FILE", conflicts_with = "law")]
+    mast: Option<PathBuf>,
+    /// Folder for compare.json (mast.json) and report/index.html [default: nothing is written]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Which law is compared
@@ -62,6 +68,18 @@ enum Law {
 
 pub(super) fn run(context: &Context, args: &CompareArgs) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start(context);
+    match (&args.mast, args.campaigns.as_slice()) {
+        (Some(mast), [campaign]) => return beside(context, args, campaign, mast),
+        (Some(_), _) => {
+            return Err(CommandError::Usage("--mast takes one campaign".to_owned()));
+        }
+        (None, [_]) => {
+            return Err(CommandError::Usage(
+                "give two campaigns or more, or one with --mast FILE".to_owned(),
+            ));
+        }
+        (None, _) => {}
+    }
     let request = Request {
         paths: args.campaigns.clone(),
         law: match args.law {
@@ -88,4 +106,30 @@ pub(super) fn run(context: &Context, args: &CompareArgs) -> Result<Exit, Command
         context.say(&format!("Compared in {watch} -> {}", page.shown()));
     }
     Ok(compared.ending.into())
+}
+
+/// Compares a campaign with a mast.
+fn beside(
+    context: &Context,
+    args: &CompareArgs,
+    campaign: &Path,
+    mast: &Path,
+) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start(context);
+    let paper = args.paper.wish()?;
+    let found = mast::run(context, campaign, mast, args.output.as_deref())?;
+    if context.json {
+        context.print_json(&found.comparison)?;
+    } else {
+        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
+        context.print(&report::mast_summary(&found.comparison, width))?;
+    }
+    if let Some(paper) = &paper {
+        paper.write(context, Shown::Mast(&found.comparison))?;
+    }
+    if let Some(page) = &found.page {
+        context.result(page)?;
+        context.say(&format!("Compared in {watch} -> {}", page.shown()));
+    }
+    Ok(Exit::Done)
 }

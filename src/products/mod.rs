@@ -20,7 +20,7 @@ mod words;
 use crate::analysis::result::Analysis;
 
 pub use where_when::{Fix, FixBy, WhereWhen, Zero};
-pub use words::clean;
+pub use words::{clean, iso};
 
 /// Whether drones can be put on a map: any has a value and a place.
 pub fn has_map(analysis: &Analysis) -> bool {

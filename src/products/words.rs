@@ -17,7 +17,7 @@ pub(super) const REFERENCES: &str = "Thermal Updraft Profiling with an Array of 
      docs/fields.md and docs/errors.md of updraft";
 
 /// A time of UTC, in milliseconds since 1970, as ISO 8601 has it: `2026-06-01T12:00:52.000Z`.
-pub(super) fn iso(utc_ms: i64) -> String {
+pub fn iso(utc_ms: i64) -> String {
     let (seconds, ms) = (utc_ms.div_euclid(1000), utc_ms.rem_euclid(1000));
     let (days, second) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
     let (year, month, day) = date(days);

@@ -50,6 +50,7 @@ pub mod hashes;
 pub mod hidden;
 pub mod host;
 pub(crate) mod live;
+pub mod mast;
 pub mod mission;
 mod pages;
 pub mod paper;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::TableError;
+use super::read::Wish;
 use crate::base::file::read_whole;
 use crate::base::parse;
 use crate::flight::Indicator;
@@ -163,6 +164,11 @@ impl Mapping {
             *file = folder.join(&*file);
         }
         Ok(mapping)
+    }
+
+    /// Columns that are read of each table.
+    pub(super) fn wish(&self) -> Wish<'_> {
+        Wish { delimiter: self.delimiter, time: &self.time, channels: self.channels() }
     }
 
     /// The channels, with their names in the file.

@@ -13,7 +13,7 @@ use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
 
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
-pub use read::{read, read_from};
+pub use read::{Columns, Wish, read, read_columns, read_from};
 
 /// Error of reading a flight from tables.
 #[derive(Debug, Error)]

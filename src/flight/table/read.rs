@@ -61,18 +61,48 @@ impl Wanted<'_> {
     }
 }
 
+/// Columns that are read of a table.
+#[derive(Clone, Debug)]
+pub struct Wish<'a> {
+    /// Character between the cells.
+    pub delimiter: char,
+    /// Column of times.
+    pub time: &'a TimeColumn,
+    /// Quantities, each with its name in messages.
+    pub channels: Vec<(&'static str, &'a Channel)>,
+}
+
+/// Columns of a table as series; time counts from the first row.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    /// GPS time of the first row, if the table says.
+    pub start: Option<GpsTime>,
+    /// Quantities, in the order of the wish, with their names.
+    pub channels: Vec<(&'static str, Series)>,
+    /// What must be known of how the table was read, a sentence each.
+    pub warnings: Vec<String>,
+}
+
 /// Reads a table as a flight; show time counts from its first row.
 ///
 /// # Errors
 /// [`TableError`]: a column is missing, a cell is no number or no time, or there are too few rows.
 pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
+    Ok(flight(read_columns(path, &mapping.wish())?, path, mapping))
+}
+
+/// Reads columns of a table.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_columns(path: &Path, wish: &Wish<'_>) -> Result<Columns, TableError> {
     let fail = |source| TableError::File(FileError::new("open", path, source));
     let file = open_named(path).map_err(fail)?;
     let bytes = file.metadata().map_err(fail)?.len();
     if bytes > MOST_BYTES {
         return Err(TableError::Huge { path: path.to_owned(), bytes, most: MOST_BYTES });
     }
-    read_from(file.take(MOST_BYTES), path, mapping)
+    columns_from(file.take(MOST_BYTES), path, wish)
 }
 
 /// Passes bytes on, and none when too many came since the last row was taken.
@@ -101,19 +131,21 @@ impl<R: Read> Read for Bounded<'_, R> {
 ///
 /// As [`read`].
 pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
+    Ok(flight(columns_from(bytes, path, &mapping.wish())?, path, mapping))
+}
+
+fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Columns, TableError> {
     let since_row = Cell::new(0);
     let bytes = Bounded { inner: bytes, since_row: &since_row };
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(mapping.delimiter as u8)
-        .flexible(true)
-        .from_reader(bytes);
+    let mut reader =
+        csv::ReaderBuilder::new().delimiter(wish.delimiter as u8).flexible(true).from_reader(bytes);
     let broken =
         |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
     let heads = reader.headers().map_err(broken)?.clone();
-    let table = Columns::of(&heads, path, mapping)?;
+    let table = Places::of(&heads, path, wish)?;
     let mut rows = Rows {
         path,
-        mapping,
+        time: wish.time,
         table,
         first: None,
         start: None,
@@ -142,22 +174,18 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
         let Rows { taken, backward, .. } = rows;
         return Err(TableError::Short { path: path.to_owned(), rows: taken, backward });
     }
-    Ok(rows.flight(cut_off.is_some()))
+    Ok(rows.columns(cut_off.is_some()))
 }
 
 /// Where a table's columns are.
-struct Columns<'a> {
+struct Places<'a> {
     time: usize,
     /// Each channel by its name.
     channels: Vec<(&'static str, Wanted<'a>)>,
 }
 
-impl<'a> Columns<'a> {
-    fn of(
-        heads: &csv::StringRecord,
-        path: &Path,
-        mapping: &'a Mapping,
-    ) -> Result<Self, TableError> {
+impl<'a> Places<'a> {
+    fn of(heads: &csv::StringRecord, path: &Path, wish: &Wish<'a>) -> Result<Self, TableError> {
         if heads.iter().all(|head| head.trim().is_empty()) {
             return Err(TableError::Empty { path: path.to_owned() });
         }
@@ -171,9 +199,9 @@ impl<'a> Columns<'a> {
                 }
             })
         };
-        let time = find(&mapping.time.column, "time")?;
+        let time = find(&wish.time.column, "time")?;
         let mut channels = Vec::new();
-        for (name, channel) in mapping.channels() {
+        for &(name, channel) in &wish.channels {
             let columns: Result<Vec<_>, TableError> = channel
                 .columns
                 .iter()
@@ -189,8 +217,8 @@ impl<'a> Columns<'a> {
 /// The rows of a table as they are read.
 struct Rows<'a> {
     path: &'a Path,
-    mapping: &'a Mapping,
-    table: Columns<'a>,
+    time: &'a TimeColumn,
+    table: Places<'a>,
     /// Time of the first row, s: show time counts from it.
     first: Option<f64>,
     /// GPS time of the first row, if the table says.
@@ -210,7 +238,7 @@ impl Rows<'_> {
             column: column.to_owned(),
             reason,
         };
-        let time = &self.mapping.time;
+        let time = self.time;
         let text = row.get(self.table.time).unwrap_or_default();
         let time_s = time_of(text, time.format)
             .ok_or_else(|| cell(&time.column, format!("\"{}\" is not a time", short(text))))?;
@@ -247,28 +275,35 @@ impl Rows<'_> {
         warnings
     }
 
-    fn flight(self, cut_off: bool) -> Flight {
-        let mut flight = Flight {
-            source: self.path.to_owned(),
-            effort: Effort { indicator: self.mapping.indicator, ..Effort::default() },
-            pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
-            clock: Clock { start: self.start, ..Clock::default() },
-            warnings: self.warnings(cut_off).into_iter().map(Into::into).collect(),
-            ..Flight::default()
-        };
-        for (name, Wanted { series, .. }) in self.table.channels {
-            match name {
-                "effort" => flight.effort.values = series,
-                "velocity_up" => flight.velocity_up_mps = series,
-                "height" => flight.height_m = from_start(series),
-                "roll" => flight.roll_rad = series,
-                "pitch" => flight.pitch_rad = series,
-                "command_up" => flight.desired_up_mps = Some(series),
-                _ => flight.truth_up_mps = Some(series),
-            }
-        }
-        flight
+    fn columns(self, cut_off: bool) -> Columns {
+        let warnings = self.warnings(cut_off);
+        let channels = self.table.channels.into_iter().map(|(name, one)| (name, one.series));
+        Columns { start: self.start, channels: channels.collect(), warnings }
     }
+}
+
+/// The flight of a table's columns.
+fn flight(columns: Columns, path: &Path, mapping: &Mapping) -> Flight {
+    let mut flight = Flight {
+        source: path.to_owned(),
+        effort: Effort { indicator: mapping.indicator, ..Effort::default() },
+        pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
+        clock: Clock { start: columns.start, ..Clock::default() },
+        warnings: columns.warnings.into_iter().map(Into::into).collect(),
+        ..Flight::default()
+    };
+    for (name, series) in columns.channels {
+        match name {
+            "effort" => flight.effort.values = series,
+            "velocity_up" => flight.velocity_up_mps = series,
+            "height" => flight.height_m = from_start(series),
+            "roll" => flight.roll_rad = series,
+            "pitch" => flight.pitch_rad = series,
+            "command_up" => flight.desired_up_mps = Some(series),
+            _ => flight.truth_up_mps = Some(series),
+        }
+    }
+    flight
 }
 
 /// That cells of a channel are no measurement: how many, and the longest time without one.

@@ -12,6 +12,7 @@ pub(super) mod laws;
 pub(super) mod levelled;
 pub(super) mod map;
 mod map_marks;
+pub(super) mod mast;
 mod plan_view;
 pub(super) mod posterior;
 pub(super) mod sensitivity;

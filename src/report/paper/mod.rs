@@ -12,10 +12,11 @@ use svg2pdf::usvg::Error as SvgError;
 use thiserror::Error;
 
 use super::format::{Format, PAGE_HEIGHT_MM};
-use super::{Basemap, Beside, compare_page, gap_page, page};
+use super::{Basemap, Beside, compare_page, gap_page, mast_page, page};
 use crate::analysis::result::Analysis;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
+use crate::mast::MastComparison;
 
 /// A figure that was drawn for a column, before it has its font.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +78,11 @@ pub fn of_verdict(verdict: &Verdict, width_mm: f64) -> Vec<Drawn> {
 /// The figures of a comparison's page for a column of `width_mm`.
 pub fn of_comparison(comparison: &Comparison, width_mm: f64) -> Vec<Drawn> {
     drawn(compare_page::figures(comparison, Format::column(width_mm)), width_mm)
+}
+
+/// The figures of a page beside a mast for a column of `width_mm`.
+pub fn of_mast(comparison: &MastComparison, width_mm: f64) -> Vec<Drawn> {
+    drawn(mast_page::figures(comparison, Format::column(width_mm)), width_mm)
 }
 
 fn drawn(figures: Vec<(String, String)>, width_mm: f64) -> Vec<Drawn> {

@@ -11,6 +11,7 @@ use crate::analysis::result::Analysis;
 use crate::base::plain::Shown as _;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
+use crate::mast::MastComparison;
 use crate::report::Beside;
 
 /// Narrowest and widest column, mm.
@@ -34,6 +35,8 @@ pub enum Shown<'a> {
     Verdict(&'a Verdict),
     /// Campaigns side by side.
     Comparison(&'a Comparison),
+    /// A campaign beside a mast.
+    Mast(&'a MastComparison),
 }
 
 impl PaperFigures {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{PaperFigures, Shown};
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
-use crate::report::paper::{Drawn, PaperFigure, of_analysis, of_comparison, of_verdict};
+use crate::report::paper::{Drawn, PaperFigure, of_analysis, of_comparison, of_mast, of_verdict};
 use crate::workflow::error::{WorkflowError, with_reasons};
 use crate::workflow::host::Host;
 
@@ -36,6 +36,7 @@ pub(super) fn write(
             Shown::Analysis(analysis, beside) => of_analysis(analysis, *beside, *width_mm),
             Shown::Verdict(verdict) => of_verdict(verdict, *width_mm),
             Shown::Comparison(comparison) => of_comparison(comparison, *width_mm),
+            Shown::Mast(comparison) => of_mast(comparison, *width_mm),
         };
         let stopped = host.stop_flag();
         let finished = drawn

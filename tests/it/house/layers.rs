@@ -32,7 +32,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("compare", &["base", "numeric", "mission", "flight", "analysis"]),
     ("archive", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis", "gap"]),
     ("products", &["base", "numeric", "mission", "flight", "analysis"]),
-    ("report", &["base", "numeric", "mission", "flight", "analysis", "gap", "study", "compare"]),
+    ("mast", &["base", "numeric", "flight", "analysis", "products"]),
+    (
+        "report",
+        &[
+            "base", "numeric", "mission", "flight", "analysis", "gap", "study", "compare",
+            "products", "mast",
+        ],
+    ),
     ("live", &["base", "numeric", "mission", "campaign", "fleet", "flight", "analysis"]),
     (
         "workflow",
@@ -52,6 +59,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "study",
             "compare",
             "products",
+            "mast",
             "report",
             "archive",
         ],

@@ -1,0 +1,346 @@
+//! The comparison itself.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use turbulence_statistics::spectrum::{Instrument, cross, mean, spectrum};
+use turbulence_statistics::transfer::Transfer;
+use turbulence_statistics::{Record, moments};
+
+use super::MastError;
+use super::matched::{averages, best_shift, matched};
+use super::record::MastRecord;
+use super::result::{
+    Average, MAST_SCHEMA, MastComparison, MastDrone, MastFlight, MastSeries, Matched,
+};
+use crate::analysis::result::Analysis;
+use crate::base::frame::{Geodetic, ShowFrame};
+use crate::products::fields::{FieldRow, rows};
+
+/// Time over which both are averaged, s.
+pub const MEAN_S: f64 = 10.0;
+/// Distance of the map's values, s.
+const STEP_S: f64 = 1.0;
+/// Longer averages that are compared, s.
+const LONGER_S: [f64; 5] = [30.0, 60.0, 120.0, 300.0, 600.0];
+/// Fewest averages of a length that are told.
+const FEWEST: usize = 3;
+/// Shifts of the mast's record that are tried, s.
+const SHIFTS_S: f64 = 60.0;
+/// Spectra are told up to this, Hz: half of the variance is left of a mean over ten seconds.
+const HIGHEST_HZ: f64 = 0.044;
+/// Fewer common seconds are no comparison.
+const FEWEST_SECONDS: usize = 30;
+
+/// Ten-second means of one drone, second by second.
+struct Drone {
+    label: String,
+    slot: Option<u16>,
+    values: BTreeMap<i64, Value>,
+    place_deg: Option<[f64; 2]>,
+    height_m: Option<f64>,
+}
+
+/// A drone's value in one second.
+#[derive(Clone, Copy)]
+struct Value {
+    w: f64,
+    se: f64,
+    noise: f64,
+    interval: [f64; 2],
+    wind: Option<[f64; 2]>,
+}
+
+/// Compares the flights of an analysis with a mast's record. `campaign` stands in messages, `made_by`: program and version.
+///
+/// # Errors
+/// If no flight can be compared.
+pub fn compare(
+    analysis: &Analysis,
+    campaign: &Path,
+    mast: &MastRecord,
+    made_by: &str,
+) -> Result<MastComparison, MastError> {
+    let mut flights: Vec<(String, Vec<FieldRow>)> = Vec::new();
+    for row in rows(analysis) {
+        match flights.last_mut().filter(|(flight, _)| *flight == row.flight) {
+            Some((_, of)) => of.push(row),
+            None => flights.push((row.flight.clone(), vec![row])),
+        }
+    }
+    let (mut compared, mut reasons) = (Vec::new(), Vec::new());
+    for (name, rows) in &flights {
+        match flight(name, rows, mast) {
+            Ok(flight) => compared.push(flight),
+            Err(reason) => reasons.push(format!("{name}: {reason}")),
+        }
+    }
+    if flights.is_empty() {
+        reasons.push("it has no map of the air".to_owned());
+    }
+    if compared.is_empty() {
+        return Err(MastError::Nothing {
+            campaign: campaign.to_owned(),
+            mast: mast.name.clone(),
+            reasons,
+        });
+    }
+    Ok(MastComparison {
+        schema: MAST_SCHEMA.to_owned(),
+        made_by: made_by.to_owned(),
+        campaign: analysis.title.clone(),
+        mast: mast.name.clone(),
+        mast_height_m: mast.height_m,
+        mast_step_s: mast.step_s,
+        flights: compared,
+        notes: mast.notes.iter().cloned().chain(reasons).collect(),
+    })
+}
+
+/// The drones of a flight with UTC, by their rows.
+fn drones(rows: &[FieldRow]) -> Vec<Drone> {
+    let mut drones: Vec<Drone> = Vec::new();
+    for row in rows {
+        let (Some(at), Some(w), Some(low), Some(high)) =
+            (row.utc_ms, row.w_mps, row.low_mps, row.high_mps)
+        else {
+            continue;
+        };
+        if drones.last().is_none_or(|drone| drone.label != row.drone) {
+            drones.push(Drone {
+                label: row.drone.clone(),
+                slot: row.slot,
+                values: BTreeMap::new(),
+                place_deg: row.fix.lat_lon_deg.map(|(deg, _)| deg),
+                height_m: row.fix.height_m,
+            });
+        }
+        let Some(drone) = drones.last_mut() else { continue };
+        let value = Value {
+            w,
+            se: row.w_se_mps.unwrap_or(f64::NAN),
+            noise: row.sd_mps.unwrap_or(0.0),
+            interval: [low, high],
+            wind: row.wind_mps,
+        };
+        drone.values.insert((at as f64 / 1000.0).round() as i64, value);
+    }
+    drones
+}
+
+/// A flight beside the mast.
+fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight, String> {
+    let mut drones = drones(rows);
+    if drones.is_empty() {
+        return Err("the times of its values are not known in UTC (no clock in the logs; for a table, utc_offset_h)".to_owned());
+    }
+    let ends = |of: fn(&BTreeMap<i64, Value>) -> Option<i64>| {
+        drones.iter().filter_map(|drone| of(&drone.values)).collect::<Vec<_>>()
+    };
+    let from = ends(|values| values.keys().next().copied()).into_iter().min().unwrap_or(0);
+    let to = ends(|values| values.keys().next_back().copied()).into_iter().max().unwrap_or(0);
+    // A clock that is centuries off must not become a record as long.
+    let span = usize::try_from(to - from).unwrap_or(usize::MAX);
+    if span > MOST_SECONDS {
+        return Err("its drones' clocks are more than a week apart".to_owned());
+    }
+    let seconds: Vec<i64> = (from..=to).collect();
+    let of_mast: Vec<f64> = seconds
+        .iter()
+        .map(|at| mast.mean(&mast.w, at * 1000, MEAN_S).unwrap_or(f64::NAN))
+        .collect();
+    let both = of_mast.iter().filter(|value| value.is_finite()).count();
+    if both < FEWEST_SECONDS {
+        let [first, last] = mast.span_ms();
+        return Err(format!(
+            "{both} s are in both records, and {FEWEST_SECONDS} are the least: the flight is from {} to {}, the mast's record \
+             from {} to {}",
+            utc(from * 1000),
+            utc(to * 1000),
+            utc(first),
+            utc(last)
+        ));
+    }
+    if let Some(place) = mast.place_deg {
+        let away =
+            |drone: &Drone| drone.place_deg.map_or(f64::INFINITY, |deg| distance_m(place, deg));
+        drones.sort_by(|a, b| away(a).total_cmp(&away(b)));
+    }
+    let columns: Vec<Vec<f64>> =
+        drones.iter().map(|drone| column(drone, &seconds, |value| value.w)).collect();
+    let (fleet, fleet_se) = fleet(&drones, &seconds);
+    let stated = mean_of(&fleet_se);
+    let nearest = columns.first().cloned().unwrap_or_default();
+    let all = matched(&fleet, &of_mast, STEP_S, stated)
+        .ok_or("the fleet's mean and the mast have no seconds in common")?;
+    let records: Vec<Record> = columns.iter().map(|values| record(values, &of_mast)).collect();
+    let noise: Vec<f64> = drones.iter().map(noise2).collect();
+    let told = drones
+        .iter()
+        .zip(&columns)
+        .zip(records.iter().zip(&noise))
+        .filter_map(|((drone, values), (record, noise))| {
+            let stated = mean_of(&column(drone, &seconds, |value| value.se));
+            Some(MastDrone {
+                drone: drone.label.clone(),
+                slot: drone.slot,
+                distance_m: mast
+                    .place_deg
+                    .zip(drone.place_deg)
+                    .map(|(mast, drone)| distance_m(mast, drone)),
+                above_m: drone.height_m.zip(mast.height_m).map(|(drone, mast)| drone - mast),
+                matched: matched(values, &of_mast, STEP_S, stated)?,
+                inside_share: inside(drone, &seconds, &of_mast),
+                variance: moments::variance(record, *noise, 0.0),
+            })
+        })
+        .collect();
+    let of_mast_record = record(&of_mast, &fleet);
+    let refs: Vec<&Record> = records.iter().collect();
+    let instrument = Instrument {
+        transfer: Transfer { mean_s: MEAN_S, ..Transfer::NONE },
+        highest_hz: HIGHEST_HZ,
+        ..Instrument::default()
+    };
+    let own: Vec<f64> = mast
+        .w
+        .between(
+            (from as f64) - mast.zero_ms as f64 / 1000.0,
+            to as f64 - mast.zero_ms as f64 / 1000.0,
+        )
+        .to_vec();
+    Ok(MastFlight {
+        flight: name.to_owned(),
+        span_ms: [from * 1000, to * 1000],
+        averages: longer(&fleet, &nearest, &of_mast, stated),
+        mast_variance: moments::variance(&of_mast_record, 0.0, 0.0),
+        mast_variance_all: variance_of(&own),
+        drone_variance: moments::mean_variance(&refs, &noise, 0.0),
+        mast_spectrum: spectrum(&of_mast_record, &instrument),
+        drone_spectrum: mean(&refs, &instrument),
+        coherence: records
+            .first()
+            .map(|first| cross(first, &of_mast_record, &instrument))
+            .unwrap_or_default(),
+        best_shift: best_shift(&fleet, &of_mast, STEP_S, SHIFTS_S),
+        wind: wind(&drones, &seconds, mast),
+        fleet: all,
+        drones: told,
+        series: MastSeries {
+            time_s: seconds.iter().map(|at| (at - from) as f64).collect(),
+            mast: of_mast,
+            fleet,
+            fleet_se,
+            nearest,
+        },
+    })
+}
+
+/// A flight with its mast is not longer, s.
+const MOST_SECONDS: usize = 7 * 86_400;
+
+fn column(drone: &Drone, seconds: &[i64], of: impl Fn(&Value) -> f64) -> Vec<f64> {
+    seconds.iter().map(|at| drone.values.get(at).map_or(f64::NAN, &of)).collect()
+}
+
+/// Mean of the drones in each second, with its standard error: most of an error is common to all drones, so that the mean
+/// is no better than the drones' own.
+fn fleet(drones: &[Drone], seconds: &[i64]) -> (Vec<f64>, Vec<f64>) {
+    let enough = drones.len().div_ceil(2);
+    let mean = |at: &i64| {
+        let values: Vec<&Value> = drones.iter().filter_map(|drone| drone.values.get(at)).collect();
+        if values.len() < enough {
+            return (f64::NAN, f64::NAN);
+        }
+        let n = values.len() as f64;
+        let of = |of: fn(&Value) -> f64| values.iter().map(|value| of(value)).sum::<f64>() / n;
+        (of(|value| value.w), of(|value| value.se))
+    };
+    seconds.iter().map(mean).unzip()
+}
+
+fn mean_of(values: &[f64]) -> Option<f64> {
+    let known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}
+
+fn variance_of(values: &[f64]) -> f64 {
+    let mean = mean_of(values).unwrap_or(0.0);
+    let squares: Vec<f64> = values.iter().map(|value| (value - mean).powi(2)).collect();
+    mean_of(&squares).unwrap_or(0.0)
+}
+
+/// Mean variance of a drone's own noise, (m/s)².
+fn noise2(drone: &Drone) -> f64 {
+    let squares: Vec<f64> = drone.values.values().map(|value| value.noise.powi(2)).collect();
+    mean_of(&squares).unwrap_or(0.0)
+}
+
+/// Values where the other record has one, too.
+fn record(values: &[f64], other: &[f64]) -> Record {
+    let both = values
+        .iter()
+        .zip(other)
+        .map(|(value, other)| (value.is_finite() && other.is_finite()).then_some(*value));
+    Record::new(STEP_S, both)
+}
+
+fn inside(drone: &Drone, seconds: &[i64], mast: &[f64]) -> f64 {
+    let both = seconds.iter().zip(mast).filter(|(_, mast)| mast.is_finite());
+    let all: Vec<bool> = both
+        .filter_map(|(at, mast)| {
+            let [low, high] = drone.values.get(at)?.interval;
+            Some((low..=high).contains(mast))
+        })
+        .collect();
+    all.iter().filter(|inside| **inside).count() as f64 / all.len().max(1) as f64
+}
+
+fn longer(fleet: &[f64], nearest: &[f64], mast: &[f64], stated: Option<f64>) -> Vec<Average> {
+    let of = |length_s: f64| {
+        let count = (length_s / STEP_S) as usize;
+        let [fleet, nearest, mast] = [fleet, nearest, mast].map(|values| averages(values, count));
+        Some(Average {
+            length_s,
+            fleet: matched(&fleet, &mast, length_s, stated)?,
+            nearest: matched(&nearest, &mast, length_s, None)?,
+        })
+    };
+    let all = LONGER_S.into_iter().filter_map(of);
+    all.filter(|average| average.fleet.count >= FEWEST).collect()
+}
+
+/// Wind of the fleet against the mast's.
+fn wind(drones: &[Drone], seconds: &[i64], mast: &MastRecord) -> Option<[Matched; 2]> {
+    let measured = mast.wind.as_ref()?;
+    let one = |axis: usize| {
+        let of_mast: Vec<f64> = seconds
+            .iter()
+            .map(|at| mast.mean(&measured[axis], at * 1000, MEAN_S).unwrap_or(f64::NAN))
+            .collect();
+        let of_drones: Vec<f64> = seconds
+            .iter()
+            .map(|at| {
+                let all: Vec<f64> = drones
+                    .iter()
+                    .filter_map(|drone| Some(drone.values.get(at)?.wind?[axis]))
+                    .collect();
+                mean_of(&all).unwrap_or(f64::NAN)
+            })
+            .collect();
+        matched(&of_drones, &of_mast, STEP_S, None)
+    };
+    Some([one(0)?, one(1)?])
+}
+
+/// Horizontal distance of two places, m.
+fn distance_m([lat_deg, lon_deg]: [f64; 2], other: [f64; 2]) -> f64 {
+    let origin = Geodetic { lat_deg, lon_deg, amsl_m: 0.0 };
+    let frame = ShowFrame { origin, orientation_deg: 0.0 };
+    let place = frame.from_geodetic(Geodetic { lat_deg: other[0], lon_deg: other[1], amsl_m: 0.0 });
+    place.x.hypot(place.y)
+}
+
+fn utc(ms: i64) -> String {
+    crate::products::iso(ms)
+}

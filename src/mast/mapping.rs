@@ -1,0 +1,161 @@
+//! Description of a mast's table: TOML, or the names of its columns alone.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::MastError;
+use crate::base::file::read_whole;
+use crate::base::parse;
+use crate::flight::table::{Channel, TimeColumn, TimeFormat, Wish};
+
+/// Name and version of the format.
+const SCHEMA: &str = "updraft.mast/1";
+/// Largest description, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+/// Names by which columns are known without a description, in the order in which they are tried.
+const TIMES: [&str; 5] = ["utc", "time", "timestamp", "datetime", "date"];
+const UP: [&str; 3] = ["w_mps", "w", "upward_air_velocity"];
+const EAST: [&str; 3] = ["u_mps", "u", "eastward_wind"];
+const NORTH: [&str; 3] = ["v_mps", "v", "northward_wind"];
+
+/// Description of a mast's table.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MastMapping {
+    /// Format name and version: `updraft.mast/1`.
+    pub schema: String,
+    /// Name of the mast, for people.
+    #[serde(default)]
+    pub name: String,
+    /// Table of the mast, relative to the description.
+    pub file: PathBuf,
+    /// Character between the cells.
+    #[serde(default = "comma")]
+    pub delimiter: char,
+    /// Column of times, and its format. Numbers count since 1970.
+    pub time: TimeColumn,
+    /// Vertical air speed, m/s, up positive.
+    pub w: Channel,
+    /// Wind towards east, m/s.
+    pub u: Option<Channel>,
+    /// Wind towards north, m/s.
+    pub v: Option<Channel>,
+    /// Latitude of the mast, degrees.
+    pub latitude_deg: Option<f64>,
+    /// Longitude of the mast, degrees.
+    pub longitude_deg: Option<f64>,
+    /// Height of the instrument above the ground, m.
+    pub height_m: Option<f64>,
+}
+
+fn comma() -> char {
+    ','
+}
+
+impl MastMapping {
+    /// Reads a description; the path of its table becomes relative to the working directory.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is no description.
+    pub fn load(path: &Path) -> Result<Self, MastError> {
+        let wrong = |reason: String| MastError::Mapping { path: path.to_owned(), reason };
+        let bytes = read_whole(path, MAX_BYTES)?;
+        let text = std::str::from_utf8(&bytes).map_err(|error| wrong(error.to_string()))?;
+        let mut mapping: Self = parse::toml(text).map_err(|error| wrong(error.to_string()))?;
+        mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
+        // Times that are of no known zone could be anywhere: those of masts are UTC unless it is said otherwise.
+        mapping.time.utc_offset_h.get_or_insert(0.0);
+        mapping.file = path.parent().unwrap_or(Path::new("")).join(&mapping.file);
+        Ok(mapping)
+    }
+
+    /// The description of a table whose columns have usual names; its times are UTC.
+    ///
+    /// # Errors
+    /// If the columns of time and vertical air speed are not there.
+    pub fn of_heads(path: &Path, heads: &[String], first_time: &str) -> Result<Self, MastError> {
+        let find = |names: &[&str]| {
+            let called =
+                |name: &&str| heads.iter().position(|head| head.trim().eq_ignore_ascii_case(name));
+            names.iter().find_map(called).map(|index| heads[index].trim().to_owned())
+        };
+        let need = |names: &[&str], what: &str| {
+            find(names).ok_or_else(|| MastError::Record {
+                path: path.to_owned(),
+                reason: format!(
+                    "no column with {what} ({}); describe the table in a TOML file (docs/mast.md) and give that",
+                    names.join(", ")
+                ),
+            })
+        };
+        let column = need(&TIMES, "times")?;
+        let channel = |column: String| Channel { columns: vec![column], scale: 1.0, offset: 0.0 };
+        let w = channel(need(&UP, "the vertical air speed")?);
+        let is_number = first_time.trim().parse::<f64>().is_ok();
+        let format = if is_number { TimeFormat::S } else { TimeFormat::Datetime };
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Self {
+            schema: SCHEMA.to_owned(),
+            name,
+            file: path.to_owned(),
+            delimiter: ',',
+            time: TimeColumn { column, format, utc_offset_h: Some(0.0) },
+            w,
+            u: find(&EAST).map(channel),
+            v: find(&NORTH).map(channel),
+            latitude_deg: None,
+            longitude_deg: None,
+            height_m: None,
+        })
+    }
+
+    /// Column of times in a table with these heads.
+    pub(super) fn time_column(heads: &[String]) -> Option<usize> {
+        TIMES
+            .iter()
+            .find_map(|name| heads.iter().position(|head| head.trim().eq_ignore_ascii_case(name)))
+    }
+
+    /// Columns that are read.
+    pub(super) fn wish(&self) -> Wish<'_> {
+        let wind = [("u", &self.u), ("v", &self.v)];
+        let wind = wind.into_iter().filter_map(|(name, channel)| Some((name, channel.as_ref()?)));
+        let channels = std::iter::once(("w", &self.w)).chain(wind).collect();
+        Wish { delimiter: self.delimiter, time: &self.time, channels }
+    }
+
+    fn refusal(&self) -> Option<String> {
+        if self.schema != SCHEMA {
+            return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
+        }
+        if !self.delimiter.is_ascii() {
+            return Some(format!("delimiter {:?} must be one ASCII character", self.delimiter));
+        }
+        for (name, channel) in self.wish().channels {
+            if channel.columns.is_empty() {
+                return Some(format!("{name}: columns is empty; name at least one"));
+            }
+            if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
+                return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
+            }
+        }
+        if self.u.is_some() != self.v.is_some() {
+            return Some("u and v are given both or not at all".to_owned());
+        }
+        if self.latitude_deg.is_some() != self.longitude_deg.is_some() {
+            return Some("latitude_deg and longitude_deg are given both or not at all".to_owned());
+        }
+        let within = |value: Option<f64>, most: f64| value.is_none_or(|value| value.abs() <= most);
+        if !within(self.latitude_deg, 90.0) || !within(self.longitude_deg, 180.0) {
+            return Some("latitude_deg is within 90, longitude_deg within 180 degrees".to_owned());
+        }
+        if !within(self.height_m, 1e4) {
+            return Some("height_m is the height above the ground, m".to_owned());
+        }
+        if !within(self.time.utc_offset_h, 26.0) {
+            return Some("time: utc_offset_h must be within 26 h: local time less UTC".to_owned());
+        }
+        None
+    }
+}
