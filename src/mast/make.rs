@@ -112,7 +112,8 @@ fn drones(rows: &[FieldRow]) -> Vec<Drone> {
                 slot: row.slot,
                 values: BTreeMap::new(),
                 place_deg: row.fix.lat_lon_deg.map(|(deg, _)| deg),
-                height_m: row.fix.height_m,
+                // Heights of tables count from their first row, not from the ground.
+                height_m: row.fix.height_m.filter(|_| row.fix.lat_lon_deg.is_some()),
             });
         }
         let Some(drone) = drones.last_mut() else { continue };

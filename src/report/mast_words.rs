@@ -12,7 +12,7 @@ use super::text::{NONE, clean, count, fixed, signed, signed_estimate};
 pub(super) fn title(of: &MastComparison) -> String {
     let campaign = if of.campaign.is_empty() { "Campaign" } else { &of.campaign };
     let mast = if of.mast.is_empty() { "the mast" } else { &of.mast };
-    format!("{} beside {}", clean(campaign), clean(mast))
+    format!("{} against {}", clean(campaign), clean(mast))
 }
 
 /// When a flight was, and what it is compared with.
