@@ -31,6 +31,7 @@
 //! # }
 //! ```
 
+pub(crate) mod air;
 pub mod analyze;
 pub mod archive;
 pub mod basemap;
