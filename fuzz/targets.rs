@@ -29,6 +29,7 @@ use updraft::fleet::sink::Memory;
 use updraft::fleet::slots::{FleetTable, check_table};
 use updraft::flight::table::{Mapping, read_from};
 use updraft::gap::Verdict;
+use updraft::les::LesMap;
 use updraft::link::clock::S;
 use updraft::link::conversation::{Conversation, Step};
 use updraft::link::frame::{FrameReader, MAX_FRAME, MavMessage, dialect, encode};
@@ -67,6 +68,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("frame", frame),
     ("ftp_packet", ftp_packet),
     ("json_packet", json_packet),
+    ("les_map", les_map),
     ("log", log),
     ("plan", plan),
     ("records", records),
@@ -114,6 +116,13 @@ fn archive(bytes: &[u8]) {
         let stop = || Err("enough".to_owned());
         assert!(series::walk(bytes, &spans, &mut |_, _, _| stop()).is_err());
     }
+}
+
+/// What is accepted has names, and lengths above 0.
+fn les_map(bytes: &[u8]) {
+    let Ok(map) = LesMap::from_toml(&String::from_utf8_lossy(bytes)) else { return };
+    assert!([&map.u, &map.v, &map.w].iter().all(|of| !of.variable.is_empty()));
+    assert!(map.period_m.into_iter().flatten().all(|m| m.is_finite() && m > 0.0));
 }
 
 /// Datagrams of a length byte and as many bytes, to one instance: whatever they are, an answer is a

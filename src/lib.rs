@@ -17,6 +17,7 @@
 //! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
 //! * [`check`]: exact safety checks on the trajectory pieces.
 //! * [`effects`]: physics beyond the base model, each piece stated once, for simulator and analysis.
+//! * [`les`]: the output of large-eddy simulations as air to fly in.
 //! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
 //! * [`link`], [`protocol`]: MAVLink 2, and what the show protocol's bytes mean.
 //! * [`fleet`]: real vehicles: upload, preflight, start, watch, abort, logs.
@@ -59,6 +60,7 @@ pub use mavlink_station::{link, protocol};
 pub use multirotor_sim::{effects, sim, vehicle};
 pub use skybrush_show as show;
 pub use skybrush_show::check;
+pub mod les;
 pub mod live;
 pub mod mast;
 pub mod mission;

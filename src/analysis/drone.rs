@@ -26,7 +26,7 @@ use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::base::plain::{Shown as _, plain};
 use crate::flight::{Alignment, Flight, FlightOptions, Loss, Series, table};
-use crate::mission::plan::{Purpose, Segment, SegmentKind, Slot};
+use crate::mission::plan::{Purpose, Segment, Slot};
 
 /// What all logs of a flight share.
 pub(super) struct Shared<'a> {
@@ -208,9 +208,9 @@ fn measure(
     let Shared { input, .. } = shared;
     let (laws, mapping, calibration) = laws_for(reference, slot, name).ok_or(Cause::NoLaw)?;
     let fit = shared.map_law.and_then(|law| laws.of(law)).ok_or(Cause::NoFit)?;
-    let looked = track::measuring(seen.targets);
+    let looked = track::measuring(seen.targets, |target| track::height_m(seen.flight, target));
     let hover = *looked.first().ok_or(Cause::NoHover)?;
-    if looked.iter().any(|target| target.kind == SegmentKind::Horizontal) {
+    if track::is_track(&looked) {
         let aware = shared.aware.as_ref().ok_or(Cause::TrackWithoutErrors)?;
         let along = track::look(seen.flight, &looked, &shared.options.windows);
         let measured = aware.measure(seen.flight, &along, slot, name)?;

@@ -22,6 +22,7 @@ mod corrections;
 mod coverage_tests;
 pub mod density;
 mod drone;
+pub mod expected;
 pub mod fit;
 mod fit_warning;
 mod fitted;

@@ -1,5 +1,8 @@
-//! Measurement along a track: a drone that moves at constant horizontal speed measures the air
-//! along its way.
+//! Measurement along a track: a drone that moves at constant speed, along the ground or up and down, or that
+//! hovers at several heights one after the other, measures the air along its way.
+//!
+//! Of vertical legs, the law itself takes out the climb (eq. 6: the air's speed is the drone's less that relative to
+//! the air): what was calibrated is the answer to both.
 //!
 //! In the frame of the air, flying at 4 m/s through still air and standing in a wind of 4 m/s are the
 //! same: what drag and translational lift do to the pulse follows from the lean in both, and the
@@ -30,19 +33,57 @@ const GAP_S: f64 = 1.0;
 /// A log that moved by less than this share of a leg, or by more than its inverse, flew another plan.
 /// Chosen.
 const LEAST_SHARE: f64 = 0.5;
+/// Hovers whose heights are further apart than this make a column, m: a drone holds its height far better. Chosen.
+const SEVERAL_M: f64 = 3.0;
 /// Shorter legs say nothing about that, m.
 const SHORTEST_LEG_M: f64 = 10.0;
 
 /// Where a measurement looks: its longest hover; and if it has horizontal legs, all of them and every
-/// hover that is long enough for a value.
-pub(super) fn measuring(targets: &[Target]) -> Vec<&Target> {
+/// hover that is long enough for a value. Vertical legs that last longer than the
+/// hovers make a profile: all of both are looked at. So are hovers at several heights (`height_m`), which make a column.
+pub(super) fn measuring(
+    targets: &[Target],
+    height_m: impl Fn(&Target) -> Option<f64>,
+) -> Vec<&Target> {
     let long = |target: &&Target| target.end_s - target.start_s >= RUNNING_S;
-    let moves = |target: &Target| target.kind == SegmentKind::Horizontal;
-    if !targets.iter().any(|target| moves(target) && long(&target)) {
-        return updraft::hover(targets).into_iter().collect();
+    let horizontal = |target: &Target| target.kind == SegmentKind::Horizontal;
+    let hover = |target: &Target| target.kind.is_hover();
+    let any = |is: &dyn Fn(&Target) -> bool| targets.iter().any(|one| is(one) && long(&one));
+    let all = |is: &dyn Fn(&Target) -> bool| -> Vec<&Target> {
+        targets.iter().filter(|target| is(target) && long(target)).collect()
+    };
+    if any(&horizontal) {
+        return all(&|target| horizontal(target) || hover(target));
     }
-    let looked = |target: &&Target| (moves(target) || target.kind.is_hover()) && long(target);
-    targets.iter().filter(looked).collect()
+    if any(&|target| target.kind.is_leg()) && is_profile(targets) {
+        return all(&|target| target.kind.is_leg() || hover(target));
+    }
+    let longest = updraft::hover(targets);
+    let heights: Vec<f64> = all(&hover).into_iter().filter_map(height_m).collect();
+    let apart_m = crate::numeric::extent(heights).map_or(0.0, |(low, high)| high - low);
+    if apart_m >= SEVERAL_M {
+        return all(&hover);
+    }
+    longest.into_iter().collect()
+}
+
+/// Whether vertical legs are a profile, and not a ladder beside a hover: they last longer than the hovers.
+fn is_profile(targets: &[Target]) -> bool {
+    let lasting = |is: fn(SegmentKind) -> bool| -> f64 {
+        let of = targets.iter().filter(|target| is(target.kind));
+        of.map(|target| target.end_s - target.start_s).sum()
+    };
+    lasting(SegmentKind::is_leg) > lasting(SegmentKind::is_hover)
+}
+
+/// Height above home in the middle of a target, m.
+pub(super) fn height_m(flight: &Flight, target: &Target) -> Option<f64> {
+    flight.height_m.at(f64::midpoint(target.start_s, target.end_s), GAP_S)
+}
+
+/// Whether what is looked at is more than one hover: then values have a place each.
+pub(super) fn is_track(looked: &[&Target]) -> bool {
+    looked.len() > 1 || looked.iter().any(|target| !target.kind.is_hover())
 }
 
 /// Looks at all legs and hovers of a scan, as at one long hover with nothing between them.
@@ -52,7 +93,7 @@ pub(super) fn look(flight: &Flight, looked: &[&Target], options: &WindowOptions)
     let mut biases = Vec::new();
     for target in looked {
         let mut part = Hover::of(flight, target, options);
-        if target.kind == SegmentKind::Horizontal {
+        if !target.kind.is_hover() {
             drop_unsteady(flight, &mut part);
         }
         biases.push(part.velocity_bias_mps);
@@ -188,12 +229,36 @@ mod tests {
             target(SegmentKind::LegUp, 90.0, 120.0),
         ];
         let starts = |found: Vec<&Target>| found.iter().map(|one| one.start_s).collect::<Vec<_>>();
-        assert_eq!(starts(measuring(&targets)), [0.0, 40.0]);
-        assert_eq!(starts(measuring(&targets[..1])), [0.0]);
+        assert_eq!(starts(measuring(&targets, |_| None)), [0.0, 40.0]);
+        assert_eq!(starts(measuring(&targets[..1], |_| None)), [0.0]);
         // A hop of five seconds makes no scan of a hover.
         let hop = [target(hover, 0.0, 30.0), target(leg, 31.0, 36.0), target(hover, 40.0, 90.0)];
-        assert_eq!(starts(measuring(&hop)), [40.0]);
-        assert!(measuring(&[]).is_empty());
+        assert_eq!(starts(measuring(&hop, |_| None)), [40.0]);
+        assert!(measuring(&[], |_| None).is_empty());
+    }
+
+    #[test]
+    fn a_profile_is_its_legs_and_a_column_all_of_its_hovers() {
+        let (up, hover) = (SegmentKind::LegUp, SegmentKind::Hover);
+        let profile = [
+            target(hover, 0.0, 20.0),
+            target(up, 30.0, 110.0),
+            target(SegmentKind::LegDown, 115.0, 200.0),
+        ];
+        assert_eq!(measuring(&profile, |_| None).len(), 3);
+        // Legs beside a long hover are a ladder, which is another flight's business.
+        let ladder = [target(up, 0.0, 20.0), target(hover, 30.0, 330.0)];
+        assert_eq!(measuring(&ladder, |_| None), [&ladder[1]]);
+        let column =
+            [target(hover, 0.0, 60.0), target(hover, 80.0, 145.0), target(hover, 150.0, 155.0)];
+        let rising = |target: &Target| Some(20.0 + target.start_s / 4.0);
+        assert_eq!(
+            measuring(&column, rising),
+            [&column[0], &column[1]],
+            "five seconds have no value"
+        );
+        assert_eq!(measuring(&column, |_| Some(60.0)), [&column[1]], "the longest of one height");
+        assert!(is_track(&measuring(&column, rising)) && !is_track(&[&column[1]]));
     }
 
     /// East at 4 m/s from 20 s on.

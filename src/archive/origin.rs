@@ -56,8 +56,9 @@ impl Origin {
         let start = start.or(by_logs);
         let mut origin = Self { simulated, start, ..Self::default() };
         let known = |record: &FlightRecord| {
-            let FlightRecord { seed, vehicle_sha256, air_mps, air, .. } = record;
-            format!("{seed} {vehicle_sha256} {air_mps:?} {air:?}")
+            let FlightRecord { seed, vehicle_sha256, air_mps, air, air_files, .. } = record;
+            let read: Vec<&str> = air_files.iter().map(|file| file.sha256.as_str()).collect();
+            format!("{seed} {vehicle_sha256} {air_mps:?} {air:?}{}", read.join(" "))
         };
         origin.identity = format!(
             "{}\n{}\n{:?}\n{}\n",

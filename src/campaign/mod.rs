@@ -77,12 +77,27 @@ pub struct FlightRecord {
     /// Further components of the air, as `--air` takes them; then the motion is not uniform.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub air: Vec<String>,
+    /// Files that components of the air were read from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub air_files: Vec<AirFile>,
     /// Whether the firmware's whole default set of messages was logged.
     pub full_logs: bool,
     /// SHA-256 of the plan that was flown.
     pub plan_sha256: String,
     /// The logs, in slot order.
     pub logs: Vec<LogRecord>,
+}
+
+/// A file that the air of a simulated flight was read from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AirFile {
+    /// Path, as it was given.
+    pub file: String,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content.
+    pub sha256: String,
 }
 
 /// One log of a [`FlightRecord`].

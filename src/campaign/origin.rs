@@ -190,6 +190,7 @@ mod tests {
             vehicle: "pixel".to_owned(),
             vehicle_sha256: String::new(),
             air_mps: [0.0; 3],
+            air_files: Vec::new(),
             start: GpsTime { week: 2445, tow_ms: 0 },
             air: Vec::new(),
             full_logs: false,

@@ -9,6 +9,7 @@ use crate::blind::BlindError;
 use crate::campaign::CampaignError;
 use crate::compare::CompareError;
 use crate::gap::GapError;
+use crate::les::LesError;
 use crate::log::LogError;
 use crate::mission::resolve::MissionError;
 use crate::study::StudyError;
@@ -90,8 +91,9 @@ pub fn exit_of(error: &CommandError) -> Exit {
         | E::Sim(_)
         | E::Report(_)
         | E::Output(_)
-        | E::Failed(_) => Exit::Failed,
-        E::Compare(_) | E::Effect(_) | E::Log(_) | E::Usage(_) => Exit::Usage,
+        | E::Failed(_)
+        | E::Les(LesError::Open(_)) => Exit::Failed,
+        E::Compare(_) | E::Les(_) | E::Effect(_) | E::Log(_) | E::Usage(_) => Exit::Usage,
         E::Nothing(_) => Exit::Nothing,
         E::Missing { .. } => Exit::Losses,
         E::Unsafe(_) => Exit::Unsafe,

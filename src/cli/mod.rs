@@ -12,6 +12,7 @@ mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
+mod expected_words;
 mod files_args;
 mod fleet;
 mod fly;

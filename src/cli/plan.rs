@@ -9,11 +9,14 @@ use serde::Serialize;
 use super::check::few;
 use super::context::Context;
 use super::exit::{BECAUSE, CommandError, Exit, is_end_of_pipe};
+use super::expected_words::expected_words;
 use super::mission_args::MissionArgs;
 use super::{timetable, words};
+use crate::analysis::expected::{AssumedAir, ExpectedErrors, expected_errors};
 use crate::base::plain::Shown as _;
 use crate::check::CheckReport;
 use crate::mission::Plan;
+use crate::mission::plan::Purpose;
 use crate::mission::resolve::builtin_names;
 use crate::mission::too_fast::too_fast;
 use crate::workflow::check::{
@@ -55,7 +58,38 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "CHECK")]
     allow: Vec<String>,
     #[command(flatten)]
+    assumed: AssumedArgs,
+    #[command(flatten)]
     mission: MissionArgs,
+}
+
+/// Air that is assumed for the errors which a measurement will have.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Expected errors")]
+struct AssumedArgs {
+    /// Integral time of the vertical air speed over a drone that hovers, s [default: that of convective air at the flight's
+    /// height in a wind of 3 m/s]
+    #[arg(long, value_name = "S", value_parser = integral_scale)]
+    integral_scale: Option<f64>,
+    /// Standard deviation of the vertical air speed, m/s [default: that of convective air at the flight's height]
+    #[arg(long, value_name = "MPS", value_parser = air_sd)]
+    air_sd: Option<f64>,
+}
+
+/// Parser of integral times.
+fn integral_scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.1..=3_600.0).contains(&value) => Ok(value),
+        _ => Err("an integral time between 0.1 and 3600 s".to_owned()),
+    }
+}
+
+/// Parser of standard deviations.
+fn air_sd(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.01..=10.0).contains(&value) => Ok(value),
+        _ => Err("a standard deviation between 0.01 and 10 m/s".to_owned()),
+    }
 }
 
 /// What `--json` prints.
@@ -75,6 +109,8 @@ struct FlightOutput<'a> {
     plan: &'a Plan,
     /// What the checks found.
     check: &'a CheckReport,
+    /// Errors that a measurement will have in the air that is assumed; null for other flights.
+    expected: Option<ExpectedErrors>,
 }
 
 pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandError> {
@@ -83,18 +119,26 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
     let few = few(context, args.verbose);
     let mission = args.mission.resolve(&args.template)?;
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(&mission.name));
-    let (mut shows, mut reports) = (Vec::new(), Vec::new());
+    let (mut shows, mut reports, mut expected) = (Vec::new(), Vec::new(), Vec::new());
+    let assumed =
+        AssumedAir { integral_s: args.assumed.integral_scale, sd_mps: args.assumed.air_sd };
+    let calibration =
+        mission.flights.iter().map(|one| &one.plan).find(|one| one.purpose == Purpose::Calibration);
     let mut safe = true;
     // Who reads only the beginning of the timetable gets the whole campaign.
     let mut read = Ok(());
     for flight in &mission.flights {
         let show = flight.plan.to_show();
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
+        let errors = expected_errors(&flight.plan, calibration, assumed);
         if !context.json && read.is_ok() {
             let is_example = args.mission.is_example(&flight.plan.site)?;
             let mut told = timetable::describe(&flight.plan, context.width, is_example);
             if let Some(bought) = legs_buy(&flight.plan, &flight.vehicle) {
                 told = format!("{told}\n{bought}");
+            }
+            if let Some(errors) = &errors {
+                told = format!("{told}\n{}", expected_words(errors, flight.plan.slots.len()));
             }
             read = context.print(&format!("{}\n", words::wrap(&told, context.width)));
             if matches!(&read, Err(CommandError::Output(error)) if !is_end_of_pipe(error)) {
@@ -105,6 +149,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         safe &= is_safe(&report, &args.allow);
         shows.push(show);
         reports.push(report);
+        expected.push(errors);
     }
     let written = safe && !args.dry_run;
     if written {
@@ -135,7 +180,12 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
                 .flights
                 .iter()
                 .zip(&reports)
-                .map(|(flight, check)| FlightOutput { plan: &flight.plan, check })
+                .zip(expected)
+                .map(|((flight, check), expected)| FlightOutput {
+                    plan: &flight.plan,
+                    check,
+                    expected,
+                })
                 .collect(),
         })?;
     }

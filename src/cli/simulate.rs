@@ -15,7 +15,7 @@ use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::vehicle::library;
 use crate::workflow::share::ShardDone;
 use crate::workflow::simulate::{
-    Flown, Simulation, check_complete, numbered, simulate, uniform_mps,
+    Flown, Simulation, check_complete, numbered, simulate, uniform_mps, would_fly,
 };
 use crate::workflow::slots::SlotSet;
 
@@ -152,6 +152,9 @@ pub(super) struct SimulateArgs {
     /// Vehicle to fly instead of the planned one
     #[arg(long, value_name = "NAME")]
     vehicle: Option<String>,
+    /// Say what would be flown, and what models' output (--air les:...) covers, but fly nothing
+    #[arg(long)]
+    dry_run: bool,
     /// Replace simulated logs that were flown with other settings
     #[arg(long, conflicts_with_all = ["shard", "no_fly"])]
     force: bool,
@@ -203,7 +206,9 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         ..args.air.simulation(args.updraft, args.force)
     };
     // Shards share the folder, on file systems that may have no locks.
-    let _lock = share.shard.is_none().then(|| context.lock(&args.campaign)).transpose()?;
+    let _lock = (share.shard.is_none() && !args.dry_run)
+        .then(|| context.lock(&args.campaign))
+        .transpose()?;
     let mut plans = Vec::new();
     for folder in &folders {
         let plan = folder.read_plan()?;
@@ -216,6 +221,12 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         return Err(CommandError::Usage(format!("the campaign has no flight \"{name}\"")));
     }
     let plans = numbered(plans, &simulation);
+    if args.dry_run {
+        for (_, plan, simulation) in &plans {
+            would_fly(context, plan, simulation)?;
+        }
+        return Ok(Exit::Done);
+    }
     if share.gather_only {
         check_complete(&plans)?;
     }

@@ -3,7 +3,7 @@
 use super::error::TemplateError;
 use super::plan::{Grid, Slot};
 use super::source::Source;
-use super::template::{Selection, span_of};
+use super::template::{Selection, Shape, span_of};
 
 pub use crate::show::MAX_DRONES;
 
@@ -48,6 +48,14 @@ pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), Template
             .error(place, format!("{rows} x {columns} are {drones} drones"))
             .with_help(format!("a show has at most {MAX_DRONES} drones")));
     }
+    let cell: fn(usize, usize) -> (usize, usize) = match grid.shape {
+        Shape::Grid => |index, columns| (index / columns, index % columns),
+        Shape::Cross => in_cross,
+    };
+    let (rows, columns) = match grid.shape {
+        Shape::Grid => (rows, columns),
+        Shape::Cross => (arm(drones), arm(drones)),
+    };
     let centre = |index: usize, count: usize| {
         let value = (index as f64 - (count - 1) as f64 / 2.0) * spacing_m;
         let rounded = (value * 1000.0).round() / 1000.0;
@@ -55,7 +63,7 @@ pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), Template
     };
     let slots = (0..drones)
         .map(|index| {
-            let (row, column) = (index / columns, index % columns);
+            let (row, column) = cell(index, columns);
             Slot {
                 slot: (index + 1) as u16,
                 name: format!("Drone {}", index + 1),
@@ -67,6 +75,25 @@ pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), Template
         })
         .collect();
     Ok((Grid { rows: rows as u32, columns: columns as u32, spacing_m }, slots))
+}
+
+/// Cells along each line of a cross of so many drones, an odd number.
+fn arm(drones: usize) -> usize {
+    2 * (drones - 1).div_ceil(4) + 1
+}
+
+/// Row and column of a drone in a cross whose lines have so many cells: one in the middle, the others around it in turn,
+/// so that any number of drones is as balanced as it can be.
+fn in_cross(index: usize, cells: usize) -> (usize, usize) {
+    let middle = cells / 2;
+    let Some(beyond) = index.checked_sub(1) else { return (middle, middle) };
+    let out = beyond / 4 + 1;
+    match beyond % 4 {
+        0 => (middle + out, middle),
+        1 => (middle - out, middle),
+        2 => (middle, middle + out),
+        _ => (middle, middle - out),
+    }
 }
 
 /// Puts every slot into a group; each slot must be in exactly one.

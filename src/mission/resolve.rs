@@ -31,6 +31,10 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("campaign.toml", include_str!("../../templates/campaign.toml")),
     ("scan.toml", include_str!("../../templates/scan.toml")),
     ("scan-campaign.toml", include_str!("../../templates/scan-campaign.toml")),
+    ("profile.toml", include_str!("../../templates/profile.toml")),
+    ("column.toml", include_str!("../../templates/column.toml")),
+    ("cross.toml", include_str!("../../templates/cross.toml")),
+    ("race-track.toml", include_str!("../../templates/race-track.toml")),
 ];
 
 /// Origin of the built-in templates, latitude and longitude in degrees: a field in Hungary, which

@@ -41,6 +41,13 @@ pub(super) struct Offset {
     pub(super) largest_ms: u64,
 }
 
+/// What a repeat gives to its steps in one pass.
+#[derive(Clone, Copy, Default)]
+struct Inherited {
+    speed_mps: Option<f64>,
+    height_m: Option<f64>,
+}
+
 /// Converts seconds to whole milliseconds.
 fn to_ms(seconds: f64) -> u64 {
     (seconds * 1000.0).round() as u64
@@ -117,9 +124,9 @@ impl<'a> Timeline<'a> {
             span_of(&takeoff.altitude_m),
         )?;
         let (before, behind) = template.steps.split_at(timeline.steps_before_legs());
-        timeline.steps(before, None, 0)?;
+        timeline.steps(before, Inherited::default(), 0)?;
         timeline.legs()?;
-        timeline.steps(behind, None, 0)?;
+        timeline.steps(behind, Inherited::default(), 0)?;
         timeline.land()?;
         Ok(timeline.segments)
     }
@@ -127,7 +134,7 @@ impl<'a> Timeline<'a> {
     fn steps(
         &mut self,
         steps: &[Spanned<StepTemplate>],
-        speed_mps: Option<f64>,
+        inherited: Inherited,
         depth: usize,
     ) -> Result<(), TemplateError> {
         if depth > 8 {
@@ -135,7 +142,7 @@ impl<'a> Timeline<'a> {
             return Err(self.source.error(span, "repeats are nested deeper than 8"));
         }
         for step in steps {
-            self.step(step, speed_mps, depth)?;
+            self.step(step, inherited, depth)?;
         }
         Ok(())
     }
@@ -143,7 +150,7 @@ impl<'a> Timeline<'a> {
     fn step(
         &mut self,
         spanned: &Spanned<StepTemplate>,
-        speed_mps: Option<f64>,
+        inherited: Inherited,
         depth: usize,
     ) -> Result<(), TemplateError> {
         let step = spanned.get_ref();
@@ -151,9 +158,14 @@ impl<'a> Timeline<'a> {
         self.refuse_stray_keys(step)?;
         match step.kind.get_ref() {
             StepKind::Climb => {
-                let to_m = self.required(step.to_m.as_ref(), "to_m", step)?;
-                let to_m = self.source.number(to_m, "height", "m", 0.0..=MAX_ALTITUDE_M)?;
-                let speed = self.speed(step, speed_mps)?;
+                let to_m = match (&step.to_m, inherited.height_m) {
+                    (None, Some(height_m)) => height_m,
+                    (to_m, _) => {
+                        let to_m = self.required(to_m.as_ref(), "to_m", step)?;
+                        self.source.number(to_m, "height", "m", 0.0..=MAX_ALTITUDE_M)?
+                    }
+                };
+                let speed = self.speed(step, inherited.speed_mps)?;
                 let kind = if to_m >= self.position_m.z {
                     SegmentKind::Climb
                 } else {
@@ -163,7 +175,7 @@ impl<'a> Timeline<'a> {
             }
             StepKind::Leg => {
                 let duration_ms = self.duration(step)?;
-                let speed = self.speed(step, speed_mps)?;
+                let speed = self.speed(step, inherited.speed_mps)?;
                 let direction =
                     *self.required(step.direction.as_ref(), "direction", step)?.get_ref();
                 let (kind, word, sign) = match direction {
@@ -180,12 +192,12 @@ impl<'a> Timeline<'a> {
             }
             StepKind::Horizontal => {
                 let duration_ms = self.duration(step)?;
-                let speed = self.speed(step, speed_mps)?;
+                let speed = self.speed(step, inherited.speed_mps)?;
                 let heading = self.required(step.heading_deg.as_ref(), "heading_deg", step)?;
                 let heading_deg = self.source.number(heading, "heading", "deg", -360.0..=360.0)?;
                 self.horizontal(heading_deg, speed, duration_ms, span)
             }
-            StepKind::Repeat => self.repeat(step, depth),
+            StepKind::Repeat => self.repeat(step, inherited, depth),
             StepKind::Stagger => self.wait_in_air(self.offset.own_ms),
             StepKind::Rejoin => {
                 self.wait_in_air(self.offset.largest_ms.saturating_sub(self.offset.own_ms))
@@ -265,7 +277,12 @@ impl<'a> Timeline<'a> {
         self.timed(SegmentKind::Hover, &label, Vector3::zeros(), duration_ms, None)
     }
 
-    fn repeat(&mut self, step: &StepTemplate, depth: usize) -> Result<(), TemplateError> {
+    fn repeat(
+        &mut self,
+        step: &StepTemplate,
+        inherited: Inherited,
+        depth: usize,
+    ) -> Result<(), TemplateError> {
         let inner = step.steps.as_deref().unwrap_or_default();
         if inner.is_empty() {
             return Err(self
@@ -273,31 +290,41 @@ impl<'a> Timeline<'a> {
                 .error(span_of(&step.kind), "a repeat needs steps to repeat")
                 .with_help("add [[steps.steps]] tables below it"));
         }
-        match (&step.speeds_mps, &step.times) {
-            (Some(speeds), None) => {
+        match (&step.speeds_mps, &step.heights_m, &step.times) {
+            (Some(speeds), None, None) => {
                 let range = 0.01..=MAX_SPEED_MPS;
                 for speed in self.source.numbers(speeds, "speed", "m/s", &range)? {
-                    self.steps(inner, Some(speed), depth + 1)?;
+                    let pass = Inherited { speed_mps: Some(speed), ..inherited };
+                    self.steps(inner, pass, depth + 1)?;
                 }
                 Ok(())
             }
-            (None, Some(times)) => {
+            (None, Some(heights), None) => {
+                let range = 0.0..=MAX_ALTITUDE_M;
+                for height_m in self.source.numbers(heights, "height", "m", &range)? {
+                    let pass = Inherited { height_m: Some(height_m), ..inherited };
+                    self.steps(inner, pass, depth + 1)?;
+                }
+                Ok(())
+            }
+            (None, None, Some(times)) => {
                 let times = self.source.number(times, "number of passes", "", 1.0..=1000.0)?;
                 for _ in 0..times.round() as usize {
-                    self.steps(inner, None, depth + 1)?;
+                    self.steps(inner, inherited, depth + 1)?;
                 }
                 Ok(())
             }
-            _ => Err(self
-                .source
-                .error(span_of(&step.kind), "a repeat needs either `speeds_mps` or `times`")),
+            _ => Err(self.source.error(
+                span_of(&step.kind),
+                "a repeat needs one of `speeds_mps`, `heights_m` and `times`",
+            )),
         }
     }
 
     /// Each kind of step has its own keys; another one's key is a mistake, not a default.
     fn refuse_stray_keys(&self, step: &StepTemplate) -> Result<(), TemplateError> {
         let kind = *step.kind.get_ref();
-        let keys: [(&str, bool, Option<Range<usize>>); 8] = [
+        let keys: [(&str, bool, Option<Range<usize>>); 9] = [
             ("to_m", step.to_m.is_some(), step.to_m.as_ref().and_then(span_of)),
             ("speed_mps", step.speed_mps.is_some(), step.speed_mps.as_ref().and_then(span_of)),
             ("duration_s", step.duration_s.is_some(), step.duration_s.as_ref().and_then(span_of)),
@@ -308,6 +335,7 @@ impl<'a> Timeline<'a> {
                 step.heading_deg.as_ref().and_then(span_of),
             ),
             ("speeds_mps", step.speeds_mps.is_some(), step.speeds_mps.as_ref().and_then(span_of)),
+            ("heights_m", step.heights_m.is_some(), step.heights_m.as_ref().and_then(span_of)),
             ("times", step.times.is_some(), step.times.as_ref().and_then(span_of)),
             ("steps", step.steps.is_some(), span_of(&step.kind)),
         ];
@@ -585,7 +613,7 @@ fn allowed_keys(kind: StepKind) -> &'static [&'static str] {
         StepKind::Leg => &["direction", "speed_mps", "duration_s"],
         StepKind::Hover => &["duration_s"],
         StepKind::Horizontal => &["heading_deg", "speed_mps", "duration_s"],
-        StepKind::Repeat => &["speeds_mps", "times", "steps"],
+        StepKind::Repeat => &["speeds_mps", "heights_m", "times", "steps"],
         StepKind::Stagger | StepKind::Rejoin => &[],
     }
 }

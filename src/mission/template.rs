@@ -128,7 +128,18 @@ pub struct SiteTemplate {
     pub orientation_deg: Spanned<f64>,
 }
 
-/// Layout of the fleet on the ground: a rectangular grid centred on the show origin.
+/// Arrangement of the drones on the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Rows and columns.
+    #[default]
+    Grid,
+    /// Two lines that cross in the show origin: one along the rows, one along the columns.
+    Cross,
+}
+
+/// Layout of the fleet on the ground, centred on the show origin: a rectangular grid, or a cross.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GridTemplate {
@@ -139,6 +150,9 @@ pub struct GridTemplate {
     /// Number of drones; fills the grid row by row. Without rows and columns the grid is the
     /// smallest near-square one that holds them.
     pub drones: Option<Spanned<i64>>,
+    /// Arrangement of the drones: a grid of rows and columns, or a cross of as many drones.
+    #[serde(default)]
+    pub shape: Shape,
     /// Distance between neighbours, m.
     pub spacing_m: Spanned<f64>,
 }
@@ -270,7 +284,7 @@ pub enum Selection {
 pub struct StepTemplate {
     /// Manoeuvre of the step; it decides which of the other keys apply.
     pub kind: Spanned<StepKind>,
-    /// `climb`: target height above home, m.
+    /// `climb`: target height above home, m. Inside a `repeat` over heights, absent means that height.
     pub to_m: Option<Spanned<Quantity>>,
     /// `climb`, `leg`, `horizontal`: speed, m/s. Inside a `repeat` over speeds, absent means that
     /// speed.
@@ -283,6 +297,8 @@ pub struct StepTemplate {
     pub heading_deg: Option<Spanned<Quantity>>,
     /// `repeat`: one pass per speed, m/s, in this order.
     pub speeds_mps: Option<Spanned<Quantity>>,
+    /// `repeat`: one pass per height above home, m, in this order.
+    pub heights_m: Option<Spanned<Quantity>>,
     /// `repeat`: number of passes.
     pub times: Option<Spanned<Quantity>>,
     /// `repeat`: the steps of each pass.

@@ -70,6 +70,9 @@ pub enum WorkflowError {
     /// A blind flight could not be drawn, flown or scored.
     #[error(transparent)]
     Blind(Box<BlindError>),
+    /// Air cannot be read from a model's output, or does not cover the flight.
+    #[error(transparent)]
+    Les(#[from] crate::les::LesError),
     /// Measurement and simulation cannot be compared.
     #[error(transparent)]
     Gap(#[from] GapError),

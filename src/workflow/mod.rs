@@ -31,6 +31,7 @@
 //! # }
 //! ```
 
+pub(crate) mod air;
 mod analysis_file;
 pub mod analyze;
 pub mod archive;

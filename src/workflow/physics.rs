@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 
+use super::air::ReadAir;
 use super::clock::Stopwatch;
 use super::error::WorkflowError;
 use super::host::Host;
@@ -19,7 +20,7 @@ use crate::campaign;
 use crate::effects::definition::Hook;
 use crate::effects::select::{choose, known, resolved};
 use crate::sim::Atmosphere;
-use crate::sim::air::spec::{self, Air};
+use crate::sim::air::spec::Air;
 use crate::sim::json::{Instance, InstanceSetup, PORTS_PER_INSTANCE, Refusal, Status, serve};
 use crate::vehicle::{Vehicle, library};
 
@@ -100,7 +101,8 @@ pub struct Served {
 /// When the campaign, vehicle or effects cannot be used, a socket fails, or the truth cannot be written.
 pub fn run(host: &dyn Host, wish: &Physics) -> Result<(String, Vec<Served>), WorkflowError> {
     let fleet = fleet(wish)?;
-    let air = spec::build(&wish.air, &fleet.frame, wish.seed, "physics");
+    let read = ReadAir::open(host, &wish.air, &fleet.frame, None)?;
+    let air = read.with_drawn(&wish.air, &fleet.frame, wish.seed, "physics");
     let mut stations = stations(wish, &fleet, &air)?;
     for (index, station) in stations.iter().enumerate() {
         host.say(&format!(
@@ -111,6 +113,7 @@ pub fn run(host: &dyn Host, wish: &Physics) -> Result<(String, Vec<Served>), Wor
         ));
     }
     fly(host, wish, &mut stations)?;
+    read.check_read()?;
     let mut served = Vec::new();
     for (station, slot) in stations.iter().zip(1..) {
         let truth = station.instance.truth();

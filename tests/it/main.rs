@@ -17,6 +17,7 @@ mod fleet;
 mod flight;
 mod gap;
 mod house;
+mod les;
 mod live;
 mod mission;
 mod ports;

@@ -14,10 +14,10 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::cli::simulate::{AirArgs, parse_slots, updraft};
 use crate::link::clock::{MS, Micros, S};
 use crate::mission::Plan;
-use crate::sim::air::spec;
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
+use crate::workflow::air::ReadAir;
 use crate::workflow::fleet::hangar::{Hangar, Mishaps};
 use crate::workflow::fleet::one_flight;
 use crate::workflow::fleet::practice::{cards, serve};
@@ -123,7 +123,10 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
     }
     let vehicle = resolved_vehicle(&folder, None, &args.air.effects)?;
     let frame = plan.site.frame();
-    let air = spec::build(&args.air.air(args.updraft), &frame, args.air.seed, &plan.name);
+    let air = args.air.air(args.updraft);
+    let slots: Vec<_> = plan.slots.iter().collect();
+    let read = ReadAir::of_plan(context, &air, &plan, &slots)?;
+    let air = read.with_drawn(&air, &frame, args.air.seed, &plan.name);
     let clock = context.clock();
     let switched_on = GpsTime::from_unix_ms((clock.unix_us() / 1000) as i64).ok_or_else(|| {
         CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())

@@ -125,7 +125,7 @@ fn by_frequency(flight: &MastFlight, key: &str, format: Format) -> Option<Figure
         spectra.line(&line, colour, 1.8, "");
         spectra.entry(words, colour, LegendShape::Line, "");
     }
-    let unit = Axis::around("squared coherence", [0.0, 1.0].into_iter(), 1.0);
+    let unit = Axis { label: "squared coherence".to_owned(), min: 0.0, max: 1.0, step: 0.2 };
     let mut coherence = Panel::new("(b) Coherence of the nearest drone", x, unit);
     coherence.logarithmic_x();
     coherence.legend_at(LegendPosition::InsideTopRight);

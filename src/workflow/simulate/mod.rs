@@ -9,12 +9,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::record::{changed_logs, prepare, taken_down, write_record};
+use super::air::ReadAir;
 use super::clock::Stopwatch;
 use super::error::{WorkflowError, with_reasons};
 use super::host::Host;
 use super::share::numbers;
 use super::slots::SlotSet;
 use super::words;
+use crate::base::file::FileError;
 use crate::base::names::together;
 use crate::base::plain::Shown as _;
 use crate::base::shard::Share;
@@ -131,6 +133,8 @@ pub(crate) struct Ready<'a> {
     /// Those of them that have no log yet.
     pub(crate) open: Vec<&'a Slot>,
     pub(crate) air: air::Sum,
+    /// The part of the air that is read from files in flight.
+    read: ReadAir,
     share: Share,
 }
 
@@ -150,9 +154,11 @@ pub(crate) fn make_ready<'a>(
             plan.slots.len()
         )));
     }
-    let mut record = prepare(folder, plan, simulation, &vehicle)?;
     let count = plan.slots.len();
     let wanted = wanted(plan, simulation);
+    // Before anything is written: air that does not cover the flight is refused.
+    let read = ReadAir::of_plan(host, &simulation.air, plan, &wanted)?;
+    let mut record = prepare(folder, plan, simulation, &vehicle, read.files()?)?;
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {
         let path = folder.simulated_log(*slot, count);
@@ -169,14 +175,15 @@ pub(crate) fn make_ready<'a>(
         return Err(missing(&[(plan.name.clone(), slots)], wanted.len()));
     }
     let frame = plan.site.frame();
-    let air = air::spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
+    let air = read.with_drawn(&simulation.air, &frame, simulation.seed, &plan.name);
     if simulation.truth {
         wanted.par_iter().try_for_each(|slot| {
             let path = folder.truth(slot.slot, count);
             air::truth::write(&path, &air, &plan.trajectory(slot), slot.slot, &frame)
         })?;
     }
-    Ok(Ready { vehicle, record, wanted, open, air, share: simulation.share })
+    read.check_read()?;
+    Ok(Ready { vehicle, record, wanted, open, air, read, share: simulation.share })
 }
 
 /// The slots of one flight that are asked for.
@@ -230,6 +237,29 @@ fn missing(absent: &[(String, Vec<usize>)], of: usize) -> WorkflowError {
     let words = |(flight, slots): &(String, Vec<usize>)| format!("{flight} {}", numbers(slots));
     let missing = absent.iter().map(words).collect::<Vec<_>>().join("; ");
     WorkflowError::Missing { what: "logs", count, of, missing }
+}
+
+/// Says what would be flown of a flight, and checks that air which is read covers it.
+///
+/// # Errors
+///
+/// As those of [`simulate`] before it flies.
+pub fn would_fly(
+    host: &dyn Host,
+    plan: &Plan,
+    simulation: &Simulation,
+) -> Result<(), WorkflowError> {
+    let wanted = wanted(plan, simulation);
+    ReadAir::of_plan(host, &simulation.air, plan, &wanted)?;
+    let air = simulation.air.texts();
+    let air = if air.is_empty() { String::new() } else { format!(" in {}", air.join(" and ")) };
+    host.say(&format!(
+        "Would fly {}: {}, {:.0} s{air}",
+        plan.name,
+        words::count(wanted.len(), "drone"),
+        plan.duration_ms as f64 / 1000.0
+    ));
+    Ok(())
 }
 
 /// Flies one flight in the simulator, a drone on each processor; existing logs that fit are kept.
@@ -357,7 +387,18 @@ pub(crate) fn settle(
     failed: Vec<String>,
     watch: &Stopwatch,
 ) -> Result<Flown, WorkflowError> {
-    let Ready { mut record, wanted, open, share, .. } = ready;
+    let Ready { mut record, wanted, open, read, share, .. } = ready;
+    if let Err(error) = read.check_read() {
+        // They flew in other air than their record says.
+        for slot in &open {
+            let path = folder.simulated_log(slot.slot, plan.slots.len());
+            if path.exists() {
+                std::fs::remove_file(&path)
+                    .map_err(|error| FileError::new("remove", &path, error))?;
+            }
+        }
+        return Err(error);
+    }
     let bytes = if share.shard.is_none() {
         record.logs = taken_down(folder, plan, &record, &open)?;
         write_record(folder, &record)?;

@@ -12,7 +12,7 @@ use crate::base::file::{
 };
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
-use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::campaign::{AirFile, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::vehicle::Vehicle;
@@ -32,6 +32,7 @@ pub(super) fn prepare(
     plan: &Plan,
     simulation: &Simulation,
     vehicle: &Vehicle,
+    air_files: Vec<AirFile>,
 ) -> Result<FlightRecord, WorkflowError> {
     let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
     let vehicle_text = toml::to_string(vehicle)
@@ -47,6 +48,7 @@ pub(super) fn prepare(
         vehicle_sha256: sha256(vehicle_text.as_bytes()),
         air_mps: simulation.air.uniform_mps,
         air: simulation.air.texts(),
+        air_files,
         start,
         full_logs: simulation.full_logs,
         plan_sha256: sha256(&plan_bytes),

@@ -337,3 +337,57 @@ fn equal_warnings_of_many_drones_are_one() {
     assert!(each.contains("warning[low-flight] drones 1-9 at "), "{each}");
     assert_eq!(report.counts["low-flight"].warnings, 2);
 }
+
+/// Templates of what meteorologists fly, in the fleets that they have, by the vehicles that come with the program.
+#[test]
+fn profiles_columns_crosses_and_race_tracks_can_be_flown_as_they_are() {
+    for template in ["profile", "column", "cross", "race-track"] {
+        for (rows, columns) in [(4, 4), (7, 7), (1, 1)] {
+            for vehicle in ["airsim-generic-quad", "pixel"] {
+                let flight = planned(
+                    template,
+                    &[
+                        &format!("grid.rows={rows}"),
+                        &format!("grid.columns={columns}"),
+                        &format!("vehicle={vehicle}"),
+                    ],
+                );
+                let report = of_plan(&flight);
+                let what = format!("{template}, {rows} x {columns}, {vehicle}");
+                assert_eq!(flight.plan.slots.len(), rows * columns, "{what}");
+                let bad: Vec<_> =
+                    report.findings.iter().filter(|one| one.severity == Severity::Error).collect();
+                assert!(bad.is_empty(), "{what}: {report}");
+                assert_eq!(named(&report, "ladder-window"), [""; 0], "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cross_has_its_drones_on_two_lines() {
+    let home = |drones: &str| {
+        let plan = planned("cross", &[drones, "grid.rows=4", "grid.columns=4"]).plan;
+        plan.slots.iter().map(|slot| slot.home_m).collect::<Vec<_>>()
+    };
+    let [middle, ahead, behind, left, right] = home("grid.drones=5")[..] else { panic!() };
+    assert_eq!(middle, [0.0, 0.0, 0.0]);
+    assert_eq!((ahead, behind), ([10.0, 0.0, 0.0], [-10.0, 0.0, 0.0]));
+    assert_eq!((left, right), ([0.0, 10.0, 0.0], [0.0, -10.0, 0.0]));
+    let all = home("grid.drones=16");
+    assert!(all.iter().all(|place| place[0] == 0.0 || place[1] == 0.0), "{all:?}");
+    let along = all.iter().filter(|place| place[1] == 0.0).count();
+    assert_eq!((all.len(), along), (16, 9));
+}
+
+#[test]
+fn a_repeat_over_heights_climbs_to_each() {
+    let plan =
+        planned("column", &["heights_m=[30.0, 10.0, 50.0]", "grid.rows=1", "grid.columns=1"]);
+    let hovers = plan.plan.groups[0].segments.iter().filter(|segment| segment.kind.is_hover());
+    let heights: Vec<f64> = hovers.map(|segment| segment.from_m[2]).collect();
+    assert_eq!(heights, [30.0, 10.0, 50.0]);
+    let both = resolve("column", &[Override::parse("steps.0.times=2").unwrap()]);
+    let error = both.unwrap_err().to_string();
+    assert!(error.contains("one of `speeds_mps`, `heights_m` and `times`"), "{error}");
+}

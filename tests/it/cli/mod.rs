@@ -52,4 +52,5 @@ mod simulate;
 mod tables;
 #[cfg(unix)]
 mod terminal;
+mod tracks;
 mod words;

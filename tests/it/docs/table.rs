@@ -94,6 +94,11 @@ pub(crate) const RULES: &[Rule] = &[
     rule("README.md", "updraft gap my-campaign", Read(GAME)),
     rule("README.md", "updraft compare", Read(TWO)),
     rule("docs/compare.md", "updraft compare", Read(TWO)),
+    rule(
+        "docs/air.md",
+        "updraft simulate my-campaign --flight hover --air les:",
+        Read("needs the output of a model: tests/it/les makes one"),
+    ),
     rule("docs/basemap.md", "updraft analyze", Read("needs a picture: tests/it/cli/basemap.rs")),
     rule("docs/report.md", "updraft analyze", Read("draws all figures: tests/it/cli/paper.rs")),
     rule("README.md", "updraft inspect FILE", Instead("FILE", "my-campaign/show.skyc")),

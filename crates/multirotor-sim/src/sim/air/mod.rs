@@ -6,6 +6,7 @@
 mod allen;
 mod drone_constant;
 mod field;
+pub mod gridded;
 mod gusts;
 mod knots;
 mod lenschow;
@@ -22,6 +23,7 @@ pub use crate::air::{DensityNearby, SEA_LEVEL_DENSITY, density_ratio};
 pub use allen::{AllenThermals, Thermal};
 pub use drone_constant::DroneConstant;
 pub use field::{FieldScales, RandomField};
+pub use gridded::GriddedAir;
 pub use gusts::{GustSpectrum, Gusts};
 pub use knots::{KNOT_S, Knots};
 pub use lenschow::{Lenschow, convective_length_m, convective_sd_mps};

@@ -1,5 +1,7 @@
 //! Several atmospheres at once: their velocities add up.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::{AirSampler, Atmosphere};
@@ -15,6 +17,17 @@ impl Atmosphere for Sum {
 
     fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
         Box::new(Samplers(self.0.iter().map(|part| part.sampler(drone)).collect()))
+    }
+}
+
+/// Air that somebody else looks at as well.
+impl<T: Atmosphere + Send + ?Sized> Atmosphere for Arc<T> {
+    fn air_velocity(&self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
+        (**self).air_velocity(position_m, time_s)
+    }
+
+    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
+        (**self).sampler(drone)
     }
 }
 

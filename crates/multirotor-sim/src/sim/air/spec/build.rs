@@ -18,17 +18,24 @@ pub struct Air {
     pub uniform_mps: [f64; 3],
     /// All other components, in the order of the specification.
     pub moving: Vec<AirSpec>,
+    /// Components that are read from files ([`GriddedAir`](crate::sim::air::GriddedAir)): who has a reader of them
+    /// adds them to what [`build`] makes.
+    pub read: Vec<AirSpec>,
 }
 
 impl Air {
     /// Joins components with a uniform motion (east, north, up, m/s).
     pub fn new(uniform_mps: [f64; 3], specs: &[AirSpec]) -> Self {
-        let mut air = Self { uniform_mps, moving: Vec::new() };
+        let mut air = Self { uniform_mps, ..Self::default() };
         for spec in specs {
             let part = match spec.kind().name {
                 "still" => [0.0; 3],
                 "uniform" => [spec.value("east"), spec.value("north"), spec.value("up")],
                 "wind" => towards(spec.value("speed"), spec.value("from")),
+                "les" => {
+                    air.read.push(spec.clone());
+                    continue;
+                }
                 _ => {
                     air.moving.push(spec.clone());
                     continue;
@@ -43,7 +50,7 @@ impl Air {
 
     /// Specifications of the moving components as text, for records.
     pub fn texts(&self) -> Vec<String> {
-        self.moving.iter().map(ToString::to_string).collect()
+        self.moving.iter().chain(&self.read).map(ToString::to_string).collect()
     }
 
     /// Wind that fields move along with, east, north, up, m/s: that of the uniform part and of the
@@ -59,14 +66,14 @@ impl Air {
     }
 }
 
-/// A wind's velocity towards east, north and up from its speed and the direction it comes from.
-fn towards(speed_mps: f64, from_deg: f64) -> [f64; 3] {
+/// A wind's velocity towards east, north and up, m/s, from its speed and the direction it comes from, degrees.
+pub fn towards(speed_mps: f64, from_deg: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
     // Adding zero turns -0 into 0, which reads better in files.
     [-speed_mps * sin + 0.0, -speed_mps * cos + 0.0, 0.0]
 }
 
-/// Draws the air of one flight in a show's frame.
+/// Draws the air of one flight in a show's frame, except what is read from files ([`Air::read`]).
 ///
 /// The flight's name goes into the seed: flights of a campaign are flown at different hours, in
 /// different air.

@@ -50,7 +50,13 @@ struct Component {
 /// [`AirSpecError`] says what is wrong and what is allowed.
 pub fn load(text: &str) -> Result<Vec<AirSpec>, AirSpecError> {
     let plain = text.strip_prefix("templates/air/").unwrap_or(text);
-    let is_toml = Path::new(text).extension().is_some_and(|extension| extension == "toml");
+    // A component may end with the name of a TOML file.
+    let is_component = text
+        .split_once(':')
+        .and_then(|(name, _)| super::kind(name))
+        .is_some_and(|kind| !kind.words.is_empty());
+    let is_toml =
+        !is_component && Path::new(text).extension().is_some_and(|extension| extension == "toml");
     let plain = plain.strip_suffix(".toml").unwrap_or(plain);
     if is_toml && Path::new(text).is_file() {
         let bytes = read_whole(Path::new(text), MAX_BYTES)?;
@@ -90,6 +96,11 @@ pub fn from_toml(toml: &str, file: &str) -> Result<Vec<AirSpec>, AirSpecError> {
         let mut spec =
             AirSpec::of_kind(&component.kind).map_err(|error| place(error.to_string()))?;
         for (key, value) in &component.keys {
+            if let toml::Value::String(word) = value
+                && spec.say(key, word).map_err(|error| place(error.to_string()))?
+            {
+                continue;
+            }
             let number = match value {
                 toml::Value::Float(number) => *number,
                 toml::Value::Integer(number) => *number as f64,

@@ -35,6 +35,19 @@ pub struct AirKind {
     pub help: &'static str,
     /// Keys that the kind takes.
     pub keys: &'static [Key],
+    /// Keys whose values are words. The first is required, and may be given without its key, in front.
+    pub words: &'static [Word],
+}
+
+/// A key whose value is a word: a path, or one of several names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Word {
+    /// Name of the key.
+    pub name: &'static str,
+    /// Meaning of the key, and what it is without a value, for people.
+    pub help: &'static str,
+    /// Values that are allowed; empty: any text.
+    pub choices: &'static [&'static str],
 }
 
 const fn key(
@@ -62,7 +75,7 @@ const ZI: Key = key("zi", "m", Value(1_400.0), (100.0, 6_000.0), "height of the 
 
 /// Kinds of air, in the order of the help text.
 pub const KINDS: &[AirKind] = &[
-    AirKind { name: "still", help: "no motion", keys: &[] },
+    AirKind { name: "still", help: "no motion", keys: &[], words: &[] },
     AirKind {
         name: "uniform",
         help: "the same everywhere and always",
@@ -71,11 +84,13 @@ pub const KINDS: &[AirKind] = &[
             key("north", "m/s", Value(0.0), (-30.0, 30.0), "velocity towards north"),
             key("up", "m/s", Value(0.0), (-20.0, 20.0), "velocity upwards"),
         ],
+        words: &[],
     },
     AirKind {
         name: "wind",
         help: "the same horizontal wind everywhere and always",
         keys: &[key("speed", "m/s", Required, SPEED, "wind speed"), FROM],
+        words: &[],
     },
     AirKind {
         name: "profile",
@@ -87,11 +102,13 @@ pub const KINDS: &[AirKind] = &[
             key("z0", "m", Value(0.03), (1e-5, 0.99), "roughness length of the log law"),
             key("alpha", "", Derived("the log law"), (0.0, 0.6), "exponent of the power law"),
         ],
+        words: &[],
     },
     AirKind {
         name: "drone-constant",
         help: "a separate constant updraft for each drone",
         keys: &[key("sd", "m/s", Required, (0.0, 10.0), "standard deviation between drones")],
+        words: &[],
     },
     AirKind {
         name: "thermals",
@@ -105,6 +122,7 @@ pub const KINDS: &[AirKind] = &[
             WIND,
             FROM,
         ],
+        words: &[],
     },
     AirKind {
         name: "lenschow",
@@ -125,6 +143,7 @@ pub const KINDS: &[AirKind] = &[
             FROM,
             MODES,
         ],
+        words: &[],
     },
     AirKind {
         name: "field",
@@ -139,9 +158,33 @@ pub const KINDS: &[AirKind] = &[
             FROM,
             MODES,
         ],
+        words: &[],
     },
-    AirKind { name: "dryden", help: "gusts with the Dryden spectrum", keys: GUST_KEYS },
-    AirKind { name: "von-karman", help: "gusts with the von Karman spectrum", keys: GUST_KEYS },
+    AirKind {
+        name: "les",
+        help: "output of a large-eddy simulation (NetCDF): les:FILE.nc,...",
+        keys: LES_KEYS,
+        words: &[
+            Word { name: "file", help: "PALM, MicroHH, CM1, or any with a map", choices: &[] },
+            Word {
+                name: "map",
+                help: "TOML file with the names of its variables [known models]",
+                choices: &[],
+            },
+            Word {
+                name: "mode",
+                help: "replay: as it went on; advect: one time, carried by the wind [replay]",
+                choices: &["replay", "advect"],
+            },
+        ],
+    },
+    AirKind { name: "dryden", help: "gusts with the Dryden spectrum", keys: GUST_KEYS, words: &[] },
+    AirKind {
+        name: "von-karman",
+        help: "gusts with the von Karman spectrum",
+        keys: GUST_KEYS,
+        words: &[],
+    },
 ];
 
 const GUST_KEYS: &[Key] = &[
@@ -158,6 +201,17 @@ const GUST_KEYS: &[Key] = &[
     MODES,
 ];
 
+const LES_KEYS: &[Key] = &[
+    key("start", "s", Derived("its first"), (-1e9, 1e12), "the model's time at show time 0"),
+    key("x", "m", Derived("the middle"), (-1e7, 1e7), "the model's x at the show's origin"),
+    key("y", "m", Derived("the middle"), (-1e7, 1e7), "the model's y at the show's origin"),
+    key("ground", "m", Value(0.0), (-1e3, 1e4), "the model's height at the show's ground"),
+    key("x_towards", "deg", Value(90.0), DEGREES, "compass direction of the model's x axis"),
+    key("repeat", "", Value(1.0), (0.0, 1.0), "1: repeated in x and y; 0: ends at its edges"),
+    key("wind", "m/s", Derived("the model's own"), SPEED, "advect: speed at which it is carried"),
+    FROM,
+];
+
 /// Kind of air by its name; `None` if there is none.
 pub fn kind(name: &str) -> Option<&'static AirKind> {
     KINDS.iter().find(|kind| kind.name == name)
@@ -171,7 +225,8 @@ impl AirKind {
 
     /// Names of the kind's keys, for messages.
     pub fn key_names(&self) -> String {
-        self.keys.iter().map(|key| key.name).collect::<Vec<_>>().join(", ")
+        let words = self.words.iter().map(|word| word.name);
+        words.chain(self.keys.iter().map(|key| key.name)).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -181,6 +236,9 @@ pub fn help_text() -> String {
     let mut text = String::new();
     for kind in KINDS {
         let _ = writeln!(text, "  {:<15} {}", kind.name, kind.help);
+        for word in kind.words {
+            let _ = writeln!(text, "    {:<13} {}", word.name, word.help);
+        }
         for key in kind.keys {
             let unit = if key.unit.is_empty() { String::new() } else { format!(" {}", key.unit) };
             let default = match key.default {
