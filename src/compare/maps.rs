@@ -286,7 +286,9 @@ fn scales(flights: [&FlightAnalysis; 2], maps: [&UpdraftMap; 2]) -> Vec<ScaleCom
     let of_statistics: [(&str, &str, Of); 5] = [
         ("standard deviation of the air at a drone", "m/s", |of| {
             let drone = &of.baseline.as_ref()?.drone;
-            Some((drone.sd_mps, Some(ends(drone.sd_interval_mps))))
+            // What air that is slower than the record has is not in it.
+            let interval = (!drone.is_open).then(|| ends(drone.sd_interval_mps));
+            Some((drone.sd_mps, interval))
         }),
         ("integral time of the air at a drone", "s", |of| {
             let drone = &of.baseline.as_ref()?.drone;

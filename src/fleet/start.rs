@@ -70,8 +70,8 @@ pub enum StartRefusal {
     },
     /// The time left is too short to authorize the start.
     #[error(
-        "not authorized: {left_s:.0} s are left to the start, {needed_s:.0} s are needed; cancel \
-         it and set a new one"
+        "not authorized: {left_s:.0} s are left to the start, {needed_s:.0} s are needed; it is cancelled and no drone \
+         takes off: start again (--lead gives more time)"
     )]
     TooLate {
         /// Time left to the start, s.

@@ -23,6 +23,8 @@ const PAGES: [(&str, &str); 4] = [
 const FOLDERS: [&str; 4] = ["report", "gap", "study", "fields"];
 /// Folders of logs, of the campaign or of one of its flights.
 const LOGS: [&str; 2] = ["logs", "simulated"];
+/// Most files of a folder that are listed.
+const MOST_LISTED: usize = 10_000;
 /// Longest path below the campaign, folders.
 const DEEPEST: usize = 8;
 
@@ -124,6 +126,29 @@ pub fn open(root: &Path, path: &str) -> Option<(File, &'static str, u64)> {
     known.is_file().then_some((file, media, known.len()))
 }
 
+/// A page with links to the files of a folder that may be served (its address ends with a slash); `None`: there is none.
+pub fn listing(root: &Path, path: &str) -> Option<String> {
+    let parts = parts(path.strip_suffix('/')?)?;
+    if !FOLDERS.contains(&parts.first()?.as_str()) {
+        return None;
+    }
+    let entries = std::fs::read_dir(inside(root, &parts).ok()??).ok()?.take(MOST_LISTED).flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    // A name that needs no escaping: ours are all of them.
+    let is_plain = |name: &String| {
+        name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'))
+            && media(name).is_some()
+    };
+    let mut names: Vec<String> = names.filter(is_plain).collect();
+    names.sort();
+    let items: String =
+        names.iter().map(|name| format!("<li><a href=\"{name}\">{name}</a></li>\n")).collect();
+    Some(format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"color-scheme\" content=\"light dark\">\
+         <title>Files</title></head>\n<body><h1>Files</h1>\n<ul>\n{items}</ul>\n</body></html>\n"
+    ))
+}
+
 /// The path below `root`, if no link leads out of it.
 fn inside(root: &Path, parts: &[String]) -> io::Result<Option<PathBuf>> {
     let root = root.canonicalize()?;
@@ -197,6 +222,11 @@ mod tests {
         assert!(open(&root, "report/index.html").is_some_and(|(_, _, length)| length == 4));
         assert!(open(&root, "report/in.html").is_some());
         assert!(open(&root, "report/out.json").is_none());
+        let listed = listing(&root, "report/").unwrap();
+        assert!(listed.contains("<a href=\"in.html\">") && !listed.contains("report/"), "{listed}");
+        for path in ["report", "", "/", "logs/", "report/../", "gap/"] {
+            assert!(listing(&root, path).is_none(), "{path}");
+        }
         assert!(open(&root, "report").is_none() && open(&root, "gap/verdict.json").is_none());
         assert_eq!(
             links(&root, "s"),

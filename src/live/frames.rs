@@ -76,7 +76,8 @@ impl Looks {
         let view = &self.view;
         let (seen, listed, word) = seen.unwrap_or((0, 0, 0));
         let whole = seen == 0 || listed != view.drones.len();
-        let seen = if whole { 0 } else { seen };
+        // A page that begins anew forgets the words, too.
+        let (seen, word) = if whole { (0, 0) } else { (seen, word) };
         let drones = view.drones.iter().enumerate();
         Frame {
             number: self.number,
@@ -137,7 +138,8 @@ mod tests {
         assert_eq!(third.since(Some(second.sent(Some(seen)))).drones.len(), 1);
         // Another drone: the list is another.
         let fourth = third.next(view(&[5.0, 3.0, 1.0], 3));
-        assert!(fourth.since(Some(third.sent(None))).whole);
+        let frame = fourth.since(Some(third.sent(None)));
+        assert!(frame.whole && frame.said.len() == 3, "a page that begins anew is told all of it");
     }
 
     #[test]

@@ -310,11 +310,23 @@ fn file(
     secret: &str,
     path: &str,
 ) -> io::Result<()> {
-    let refuse = |status| answer(stream, status, Kind::Text, b"");
+    let refuse = |status| {
+        let words: &[u8] = match status {
+            Status::NotFound => {
+                b"This campaign has no such page or file (yet), or it is none that is shown here.\n"
+            }
+            _ => b"",
+        };
+        answer(stream, status, Kind::Text, words)
+    };
     if let Err(status) = shared.door.admit_reader(request, secret) {
         return refuse(status);
     }
     let Some(root) = &shared.setup.campaign else { return refuse(Status::NotFound) };
+    if let Some(page) = files::listing(root, path) {
+        let kind = Kind::File { media: "text/html; charset=utf-8" };
+        return answer(stream, Status::Ok, kind, page.as_bytes());
+    }
     let Some((file, media, length)) = files::open(root, path) else {
         return refuse(Status::NotFound);
     };

@@ -93,6 +93,18 @@ function largest() {
 
 const LEVEL_COLOURS = { good: "--drone", notice: "--notice", warning: "--warning", alarm: "--alarm" };
 
+/** Whether any colour stands for air. */
+function hasColours() {
+  return Boolean(state.air?.map) || state.drones.some((drone) => drone.air_mps !== null);
+}
+
+/** Colour of a drone: of its air; hollow without a value where others have one, as its blue would be sinking air. */
+function fillOf(drone, most) {
+  if (drone.air_mps !== null) return diverging(drone.air_mps, most);
+  if (drone.level === "good" && hasColours()) return colour("--paper");
+  return colour(LEVEL_COLOURS[drone.level]);
+}
+
 function drawMap() {
   if (!state.facts) return;
   bounds ??= findBounds();
@@ -100,7 +112,7 @@ function drawMap() {
   const isFlying = state.frame?.show_s !== null && state.frame?.show_s !== undefined;
   drawPlan(most, isFlying);
   drawSide(most, isFlying);
-  const hasAir = Boolean(state.air) || state.drones.some((drone) => drone.air_mps !== null);
+  const hasAir = hasColours();
   byId("legend").hidden = !hasAir;
   if (hasAir) drawScale(most);
 }
@@ -149,7 +161,7 @@ function drawPlan(most, isFlying) {
     const hasAir = drone.air_mps !== null;
     pen.beginPath();
     pen.arc(x, y, hasAir ? 7 : 5, 0, 2 * Math.PI);
-    pen.fillStyle = hasAir ? diverging(drone.air_mps, most) : colour(LEVEL_COLOURS[drone.level]);
+    pen.fillStyle = fillOf(drone, most);
     pen.fill();
     pen.lineWidth = drone.level === "good" ? 1 : 3;
     pen.strokeStyle = drone.level === "good" ? colour("--ink") : colour(LEVEL_COLOURS[drone.level]);
@@ -234,7 +246,7 @@ function drawSide(most, isFlying) {
     const [x, y] = at(drone.place_m[1], drone.place_m[2]);
     pen.beginPath();
     pen.arc(x, y, 4.5, 0, 2 * Math.PI);
-    pen.fillStyle = drone.air_mps !== null ? diverging(drone.air_mps, most) : colour(LEVEL_COLOURS[drone.level]);
+    pen.fillStyle = fillOf(drone, most);
     pen.fill();
     pen.lineWidth = drone.level === "good" ? 1 : 3;
     pen.strokeStyle = drone.level === "good" ? colour("--ink") : colour(LEVEL_COLOURS[drone.level]);

@@ -167,21 +167,26 @@ fn with_crew(
 
 /// Opens the links and runs a step that flies: `fleet abort` of other terminals is carried out
 /// meanwhile. The step listens for drones itself.
+///
+/// With `with_logs` the step brings the logs home: the page then shows what they say of the air.
 fn with_orders(
     context: &Context,
     args: &StepArgs,
-    live: &LiveArgs,
+    (live, with_logs): (&LiveArgs, bool),
     body: impl FnOnce(&dyn Host, &mut Crew<'_>) -> Result<Exit, CommandError>,
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let mut station = step_station(context, args)?;
-    let live = live.open(context, &args.campaign, &folder, &plan)?;
+    let mut live = live.open(context, &args.campaign, &folder, &plan)?;
     let host = LiveHost::new(context, live.station.clone(), live.orders);
     let mut tap = Tap::new(&mut station, live.station.clone());
     let mut handler = order_handler(&host, &mut tap, &folder);
     let mut crew = Crew::new(&host, &mut handler, &folder, &plan);
     let ended = body(&host, &mut crew);
     let ended = crew.ending(ended);
+    if with_logs && ended.is_ok() {
+        live.show_logs(&host);
+    }
     live.tell_end(&ended);
     ended
 }
@@ -299,7 +304,7 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
     let _lock = lock(context, &args.upload.step.campaign)?;
-    with_orders(context, &args.upload.step, &args.live, |host, crew| {
+    with_orders(context, &args.upload.step, (&args.live, false), |host, crew| {
         match steps::start(host, crew, args.upload.wish(), &args.lead.lead())? {
             Started::NoGo(table) => tables::preflight(context, &table),
             Started::Flown(ending) => Ok(ending.into()),

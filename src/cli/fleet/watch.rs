@@ -56,7 +56,7 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
         let ending = take_over(context, &address, &folder, &plan, wait_s, on_interrupt, with_logs)?;
         return Ok(ending.into());
     }
-    with_orders(context, &args.step, &args.live, |host, crew| {
+    with_orders(context, &args.step, (&args.live, !args.no_logs), |host, crew| {
         let on_interrupt = args.interrupt.on_interrupt.into();
         let ending = follow(host, crew, args.step.connect.wait, on_interrupt, !args.no_logs)?;
         Ok(ending.into())

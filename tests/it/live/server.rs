@@ -266,7 +266,8 @@ fn reports_beside_the_flight_are_read_with_the_secret_alone() {
         ("/files/look/fleet-live.json", 404),
         ("/files/look/report/../fleet-live.json", 404),
         ("/files/look/report/%2e%2e/fleet-live.json", 404),
-        ("/files/look/report/", 404),
+        ("/files/look/", 404),
+        ("/files/look/gap/", 404),
         ("/files/look/", 404),
     ] {
         let answer = get(address, path, "");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::down::{GUIDED_LEFT, bring_down, in_words, stopped};
 use super::eyes::Eyes;
+use super::start::refused;
 use super::stubborn::Stubborn;
 use super::{AT_ONCE, Crew};
 use crate::base::time::GpsTime;
@@ -12,7 +13,7 @@ use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
 use crate::fleet::guided::{Guided, GuidedError, GuidedFlight};
 use crate::fleet::messages::{GUIDED, set_mode};
-use crate::fleet::start::{Start, StartOptions, StartRefusal};
+use crate::fleet::start::{Start, StartOptions};
 use crate::fleet::telemetry::Drone;
 use crate::link::clock::MS;
 use crate::link::conversation::{Observer as _, run_all};
@@ -21,11 +22,6 @@ use crate::link::net::Net as _;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::fleet::interrupt::Choice;
 use crate::workflow::host::News;
-
-#[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
-fn refused(error: StartRefusal) -> WorkflowError {
-    WorkflowError::Failed(error.to_string())
-}
 
 impl<'a> Crew<'a> {
     /// Why a show cannot be flown by these drones: who has no show mode, and who has; `None`: it

@@ -27,11 +27,18 @@ use crate::workflow::host::News;
 const TOLD_AT_LEAST: u32 = 5;
 const TOLD_AT_MOST: u32 = 50;
 
+/// The refusal of a start; one that came too late is no failure: nothing was started.
+#[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
+pub(super) fn refused(error: StartRefusal) -> WorkflowError {
+    match error {
+        StartRefusal::TooLate { .. } => WorkflowError::Unsafe(error.to_string()),
+        _ => WorkflowError::Failed(error.to_string()),
+    }
+}
+
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
     pub(crate) fn announce(&mut self, options: StartOptions) -> Result<Start, WorkflowError> {
-        let refused =
-            |error: crate::fleet::start::StartRefusal| WorkflowError::Failed(error.to_string());
         self.not_ordered_down()?;
         self.step(Step::Start, "Waiting for every drone to take the start time");
         let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
@@ -45,7 +52,7 @@ impl<'a> Crew<'a> {
     /// Refuses where too little time is left to authorize a start.
     pub(crate) fn in_time(&self, start: &Start) -> Result<(), WorkflowError> {
         let left = start.check_time(&self.telemetry, self.net.now());
-        left.map_err(|error| WorkflowError::Failed(error.to_string()))
+        left.map_err(refused)
     }
 
     /// Authorizes a start that all have taken, and waits until all know.
@@ -54,9 +61,10 @@ impl<'a> Crew<'a> {
             self.cancel(start)?;
             return Err(ordered);
         }
-        start
-            .authorize(&self.telemetry, self.net.now())
-            .map_err(|error| WorkflowError::Failed(error.to_string()))?;
+        if let Err(error) = start.authorize(&self.telemetry, self.net.now()) {
+            self.cancel(start)?;
+            return Err(refused(error));
+        }
         if let Err(error) = self.write_start(start) {
             self.cancel(start)?;
             return Err(error);
