@@ -23,8 +23,8 @@ const PAUSE: Duration = Duration::from_millis(100);
   updraft live my-campaign --flight hover --speed 10
   updraft live my-campaign --listen 192.168.1.7:8700   # for others in the network
 
-The page has a slider for the time, a choice of speeds, the board and the map as they were in flight,
-what the station said then (fleet-journal.ndjson), and the air as it was analysed, if the campaign was
+The page has a slider for the time, a choice of speeds, the board and the map as they were in flight, what
+the station said by show time (fleet-journal.ndjson), and the air as it was analysed, if the campaign was
 (`updraft analyze`). Without logs there is the journal alone. It is served until Ctrl-C.
 A flight that is in the air is shown by `updraft fly --live` or `updraft fleet watch --live`.")]
 pub(super) struct LiveCommandArgs {

@@ -42,6 +42,7 @@ use crate::fleet::logs::manifest::Manifest;
 use crate::fleet::slots::FleetTable;
 use crate::gap::Verdict;
 use crate::gap::next::Next;
+use crate::mast::MastComparison;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
@@ -99,6 +100,8 @@ pub enum Format {
     Analysis,
     /// compare.json, and what `updraft compare --json` prints
     Compare,
+    /// mast.json, and what `updraft compare --mast --json` prints
+    Mast,
     /// study.json
     Study,
     /// a finished flight of a study
@@ -223,6 +226,7 @@ impl Format {
             Self::Start => schema_for!(StartRecord),
             Self::Analysis => schema_for!(Analysis),
             Self::Compare => schema_for!(Comparison),
+            Self::Mast => schema_for!(MastComparison),
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),
             Self::Sensitivity => schema_for!(SensitivityResult),

@@ -141,8 +141,9 @@ pub fn listing(root: &Path, path: &str) -> Option<String> {
     };
     let mut names: Vec<String> = names.filter(is_plain).collect();
     names.sort();
-    let items: String =
+    let items: Vec<String> =
         names.iter().map(|name| format!("<li><a href=\"{name}\">{name}</a></li>\n")).collect();
+    let items = items.concat();
     Some(format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"color-scheme\" content=\"light dark\">\
          <title>Files</title></head>\n<body><h1>Files</h1>\n<ul>\n{items}</ul>\n</body></html>\n"

@@ -19,6 +19,7 @@ mod gap;
 mod house;
 mod les;
 mod live;
+mod mast;
 mod mission;
 mod ports;
 mod products;

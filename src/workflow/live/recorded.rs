@@ -55,6 +55,8 @@ pub(super) struct OfJournal {
     pub(super) tracks: BTreeMap<u16, Track>,
     /// Sentences for all, in order.
     pub(super) said: Vec<Said>,
+    /// UTC of show time 0, ms since 1970.
+    zero_ms: u64,
 }
 
 impl OfJournal {
@@ -69,11 +71,22 @@ impl OfJournal {
         }
     }
 
+    /// The sentences with their show time, which is the time of a replay: all of them are there from its beginning.
+    pub(super) fn said_by_show_time(self) -> Vec<Said> {
+        let with_time = |said: Said| {
+            let show_s = (said.at_ms as f64 - self.zero_ms as f64) / 1000.0;
+            let (sign, whole_s) = (if show_s < 0.0 { "−" } else { "" }, show_s.abs() as u64);
+            let text = format!("[{sign}{}:{:02}] {}", whole_s / 60, whole_s % 60, said.text);
+            Said { text, ..said }
+        };
+        self.said.into_iter().map(with_time).collect()
+    }
+
     fn of(entries: &[Recorded], start: &StartRecord) -> Self {
         let slots: BTreeMap<&str, u16> =
             start.drones.iter().map(|of| (of.drone.as_str(), of.slot)).collect();
         let zero_us = u64::try_from(start.start.to_unix_ms()).unwrap_or(0).saturating_mul(1000);
-        let mut found = Self::default();
+        let mut found = Self { zero_ms: zero_us / 1000, ..Self::default() };
         for entry in of_flight(entries, start.authorized_unix_s.saturating_mul(1_000_000), zero_us)
         {
             let show_s = (entry.unix_us as f64 - zero_us as f64) * 1e-6;

@@ -78,13 +78,14 @@ pub(crate) fn replay(
     let analysed = analysis
         .as_ref()
         .and_then(|analysis| analysis.flights.iter().find(|flight| flight.name == found.name));
-    let journal = of_journal(host, &work, &folders, found)?;
+    let mut journal = of_journal(host, &work, &folders, found)?;
     let mut tracks = match found.logs[..] {
         [] => Vec::new(),
         _ => tracks(host, found, plan, analysed)?,
     };
     let logged = tracks.len();
-    let OfJournal { tracks: mut of_slot, said } = journal;
+    let mut of_slot = std::mem::take(&mut journal.tracks);
+    let said = journal.said_by_show_time();
     for track in &mut tracks {
         track.words = of_slot.remove(&track.slot).map(|told| told.words).unwrap_or_default();
     }

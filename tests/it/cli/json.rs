@@ -140,6 +140,7 @@ const FAILS: &[&[&str]] = &[
     &["analyze", "campaign"],
     &["archive", "nothing"],
     &["compare", "nothing", "elsewhere"],
+    &["compare", "nothing", "--mast", "nothing.csv"],
     &["archive", "campaign"],
     &["sweep", "nothing"],
     &["gap", "nothing"],

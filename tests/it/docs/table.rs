@@ -94,6 +94,7 @@ pub(crate) const RULES: &[Rule] = &[
     rule("README.md", "updraft gap my-campaign", Read(GAME)),
     rule("README.md", "updraft compare", Read(TWO)),
     rule("docs/compare.md", "updraft compare", Read(TWO)),
+    rule("docs/mast.md", "updraft compare", Read("needs a mast's record: tests/it/mast")),
     rule(
         "docs/air.md",
         "updraft simulate my-campaign --flight hover --air les:",

@@ -9,7 +9,7 @@ use super::hear::hear_together;
 use crate::base::time::GpsTime;
 use crate::fleet::abort::Aborted;
 use crate::fleet::journal::Journal;
-use crate::fleet::start::{Start, StartOptions, StartPhase};
+use crate::fleet::start::{Start, StartOptions, StartPhase, StartRefusal};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
