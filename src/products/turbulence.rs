@@ -191,6 +191,7 @@ fn quantities(text: &mut String, flight: &str, found: &Turbulence) {
     let carried = found.carried_by.map(|by| around(by.speed_mps.value, by.speed_mps.se));
     rows.interval("wind_that_carries", "m s-1", carried);
     rows.component("w", found.vertical.as_ref());
+    rows.interval("updraft_fraction", "1", found.updraft_fraction);
     rows.component("u", found.along.as_ref());
     rows.component("v", found.across.as_ref());
     rows.interval("kinetic_energy", "m2 s-2", found.kinetic_energy);

@@ -263,7 +263,23 @@ fn vertical(found: &mut Turbulence, drones: &[Drone<'_>], aligned: &[Aligned], c
     for at in &mut found.distances {
         at.correlation = variance.map(|variance| at.covariance.value / variance);
     }
+    found.updraft_fraction =
+        component.variance.and_then(|variance| updraft_fraction(&records, &variance));
     found.vertical = Some(component);
+}
+
+/// Share of values above their drone's mean, with the error of a Gaussian process: the signs of one with an exponential
+/// autocovariance have `ln 2` of its integral time, and its variance has `t/T` degrees of freedom.
+fn updraft_fraction(records: &[&Record], variance: &Moment) -> Option<Interval> {
+    let above = |record: &&Record| {
+        let centre = record.mean()?;
+        mean(record.known().map(|value| if value > centre { 1.0 } else { 0.0 }))
+    };
+    let value = mean(records.iter().filter_map(above))?;
+    let freedom = 2.0 * (variance.value / variance.random).powi(2);
+    let se = (value * (1.0 - value) * 2.0 * std::f64::consts::LN_2 / freedom).sqrt();
+    let [low, high] = [-1.0, 1.0].map(|sign| (value + sign * NORMAL * se).clamp(0.0, 1.0));
+    (freedom > 0.0 && se.is_finite()).then_some(Interval { value, low, high })
 }
 
 fn short(name: &str, length_s: f64, time: Option<Interval>) -> String {
@@ -332,7 +348,7 @@ fn component(
     let within = mean(own.iter().map(|own| own.value - own.systematic))?;
     let time_s = integral_time(records);
     let known = time_s.filter(|time| time.value * FEWEST_TIMES <= common.length_s);
-    let variance = known.and_then(|_| fleet_variance(records, &noises, &own, scale_se));
+    let variance = known.and_then(|_| fleet_variance(records, &own, scale_se));
     let instrument = instrument(white, scale_se, limit_hz, common.step_s);
     let skewnesses: Vec<Moment> = records
         .iter()
@@ -347,7 +363,11 @@ fn component(
         skewness: known.and_then(|_| fleet_skewness(&skewnesses, &own, variance.as_ref())),
         scales: known.map(|time| scales(time, common)),
         scale_se,
-        spectrum: mean_spectrum(records, &instrument),
+        // Coherence of all pairs goes with the square of their number.
+        spectrum: mean_spectrum(
+            &pairs::spread(records).into_iter().copied().collect::<Vec<_>>(),
+            &instrument,
+        ),
     })
 }
 
@@ -357,12 +377,7 @@ fn instrument(noise: f64, scale_se: f64, highest_hz: f64, step_s: f64) -> Instru
 }
 
 /// Mean variance of the drones; how far they are independent is told by coarser records.
-fn fleet_variance(
-    records: &[&Record],
-    noises: &[f64],
-    own: &[Moment],
-    scale_se: f64,
-) -> Option<Moment> {
+fn fleet_variance(records: &[&Record], own: &[Moment], scale_se: f64) -> Option<Moment> {
     let coarse: Vec<Record> = records.iter().map(|record| pairs::coarse(record)).collect();
     let coarse: Vec<&Record> = pairs::spread(&coarse);
     let together = mean_variance(&coarse, &vec![0.0; coarse.len()], 0.0)?;
@@ -373,7 +388,6 @@ fn fleet_variance(
     let random = share * mean(own.iter().map(|own| own.random))?;
     let systematic = mean(own.iter().map(|own| own.systematic))?;
     let time_s = mean(own.iter().map(|own| own.time_s))?;
-    let _ = noises;
     Some(Moment::of_variance(value, random, scale_se, (systematic, time_s)))
 }
 

@@ -28,6 +28,10 @@ pub struct Turbulence {
     /// Component across the mean wind, of the fleet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub across: Option<Component>,
+    /// Share of the time and the drones in which the air rises faster than the drone's mean: the updraft fraction, which no
+    /// error of the zero touches.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub updraft_fraction: Option<Interval>,
     /// Turbulent kinetic energy, half the sum of the three variances, m²/s².
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kinetic_energy: Option<Interval>,

@@ -137,14 +137,18 @@ fn air(kind: &str, flight: usize) -> Option<AirSettings> {
         "advected" => {
             AirSettings { field: field(0.5, 60.0, 300.0, true), wind_mps: [2.0, 0.0], ..still }
         }
-        // Turbulence: eddies that the wind carries past, and gusts of each drone's own.
-        "turbulent" => AirSettings {
+        // Turbulence: eddies that the wind carries past, and gusts of each drone's own; calibrated in the same wind, or in
+        // still air.
+        "turbulent" | "turbulent-calibrated-calm" => AirSettings {
             field: field(0.4, 25.0, 60.0, true),
             own_mps: 0.3,
             own_s: 3.0,
-            wind_mps: if flight == 0 { [0.0; 2] } else { [3.0, 0.0] },
+            wind_mps: if flight == 0 && kind != "turbulent" { [0.0; 2] } else { [3.0, 0.0] },
             ..still
         },
+        "turbulent-calm" => {
+            AirSettings { field: field(0.4, 25.0, 10.0, false), own_mps: 0.3, own_s: 3.0, ..still }
+        }
         "wind-change" => AirSettings {
             field: field(0.3, 60.0, 60.0, false),
             wind_mps: [if flight == 0 { 1.0 } else { 8.0 }, 0.0],

@@ -7,13 +7,13 @@ use updraft::analysis::result::Turbulence;
 use updraft::blind::worlds::maps;
 use updraft::workflow::find::{Work, find};
 
-const SEEDS: std::ops::Range<u64> = 2101..2113;
+const SEEDS: std::ops::Range<u64> = 2101..2117;
 
-fn flown(seed: u64) -> Turbulence {
+fn flown(kind: &str, seed: u64) -> Turbulence {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("turbulent");
     let fleet = Fleet { side: 3, spacing_m: 15.0, hover_s: 600.0 };
-    maps::fly(&fleet.plan(&root), "turbulent", seed, None, None).unwrap();
+    maps::fly(&fleet.plan(&root), kind, seed, None, None).unwrap();
     let mut work = Work::new(&root);
     find(&root, None, &mut work).unwrap();
     analysed(&work).pop().unwrap()
@@ -21,7 +21,7 @@ fn flown(seed: u64) -> Turbulence {
 
 #[test]
 fn a_foreign_plants_turbulence_is_measured() {
-    let found: Vec<Turbulence> = SEEDS.map(flown).collect();
+    let found: Vec<Turbulence> = SEEDS.map(|seed| flown("turbulent", seed)).collect();
     // A field of 0.4 m/s and own gusts of 0.3 m/s.
     let truth = 0.25;
     let variances: Vec<_> =
@@ -49,4 +49,17 @@ fn a_foreign_plants_turbulence_is_measured() {
         found.iter().filter_map(|one| Some(one.advection?.speed_mps.value / 3.0)).collect();
     println!("advection: {speeds:.2?}");
     assert!(speeds.len() >= 8 && (median(speeds) - 1.0).abs() < 0.15);
+}
+
+#[test]
+fn another_wind_than_the_calibrations_is_in_the_interval() {
+    let found: Vec<Turbulence> =
+        (2201..2209).map(|seed| flown("turbulent-calibrated-calm", seed)).collect();
+    let variances: Vec<_> =
+        found.iter().filter_map(|one| one.vertical.as_ref()?.variance).collect();
+    let inside = variances.iter().filter(|of| of.low <= 0.25 && 0.25 <= of.high).count();
+    let off: Vec<f64> = variances.iter().map(|of| of.value / 0.25).collect();
+    println!("var(w)/truth: {off:.2?}, inside {inside} of {}", variances.len());
+    let [_, high] = wilson(inside, variances.len());
+    assert!(high >= 0.91, "{inside} of {}", variances.len());
 }

@@ -10,7 +10,9 @@ use updraft::analysis::result::Turbulence;
 const SD_MPS: f64 = 0.5;
 const LENGTH_M: f64 = 50.0;
 const WIND_MPS: f64 = 3.0;
-const SEEDS: std::ops::Range<u64> = 1..41;
+const SEEDS: std::ops::Range<u64> = 1..31;
+/// Spectra are compared from here on, Hz.
+const LOWEST_HZ: f64 = 1.0 / 300.0;
 
 /// One-sided spectral density across the wind, (m/s)²/Hz (MIL-F-8785C).
 fn density(frequency_hz: f64) -> f64 {
@@ -27,7 +29,7 @@ fn dissipation() -> f64 {
 
 fn flown() -> Vec<Turbulence> {
     let fleet = Fleet { side: 2, spacing_m: 15.0, hover_s: 600.0 };
-    fleet.flown(SEEDS, &["von-karman:sd=0.5,length=50,modes=1500", "wind:speed=3,from=240"])
+    fleet.flown(SEEDS, &["von-karman:sd=0.5,length=50,modes=6000"], "wind:speed=3,from=240")
 }
 
 /// That the share of so many that hold agrees with one of these.
@@ -45,14 +47,15 @@ fn gusts_of_known_statistics_are_measured() {
         found.iter().filter_map(|one| one.vertical.as_ref()?.variance).collect();
     let off = median(variances.iter().map(|of| of.value / truth).collect());
     println!("var(w)/truth: median {off:.3} of {}", variances.len());
-    assert!(variances.len() > 35, "{}", variances.len());
+    assert!(variances.len() > 26, "{}", variances.len());
     assert!((off - 1.0).abs() < 0.1, "{off}");
     let inside = variances.iter().filter(|of| of.low <= truth && truth <= of.high).count();
     assert_share("var(w)", inside, variances.len(), [0.91, 0.98]);
 
     let mut bands = BTreeMap::<u64, [usize; 2]>::new();
     let mut ratios = BTreeMap::<u64, Vec<f64>>::new();
-    for band in found.iter().flat_map(|one| &one.vertical.as_ref().unwrap().spectrum) {
+    let all = found.iter().flat_map(|one| &one.vertical.as_ref().unwrap().spectrum);
+    for band in all.filter(|band| band.frequency_hz >= LOWEST_HZ) {
         let key = ((band.frequency_hz.log10() + 4.0) * 8.0) as u64;
         let truth = density(band.frequency_hz);
         let [held, of] = bands.entry(key).or_default();
@@ -99,12 +102,12 @@ fn gusts_of_known_statistics_are_measured() {
 fn a_short_record_says_what_is_not_known() {
     let fleet = Fleet { side: 2, spacing_m: 15.0, hover_s: 60.0 };
     let found =
-        fleet.flown(1..2, &["von-karman:sd=0.5,length=50,modes=200", "wind:speed=3,from=240"]);
+        fleet.flown(1..2, &["von-karman:sd=0.5,length=50,modes=200"], "wind:speed=3,from=240");
     let short = found.first().unwrap();
     assert!(short.vertical.is_none() && short.drones.is_empty(), "{short:?}");
     assert!(short.absent.iter().any(|text| text.contains("39 s")), "{:?}", short.absent);
     let fleet = Fleet { side: 2, spacing_m: 15.0, hover_s: 150.0 };
-    let found = fleet.flown(2..3, &["field:sd=0.5,lambda=145,tau=186,modes=200"]);
+    let found = fleet.flown(2..3, &["field:sd=0.5,lambda=145,tau=186,modes=200"], "still");
     let slow = found.first().unwrap();
     let up = slow.vertical.as_ref().unwrap();
     assert!(up.variance.is_none() && up.scales.is_none() && up.within_record > 0.0, "{up:?}");

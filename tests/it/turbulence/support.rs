@@ -51,8 +51,13 @@ impl Fleet {
         campaign::flights(root).unwrap()
     }
 
-    /// Turbulence of hovers in these airs, by the calibration in still air.
-    pub(crate) fn flown(&self, seeds: std::ops::Range<u64>, air: &[&str]) -> Vec<Turbulence> {
+    /// Turbulence of hovers in such air, each with its own seed, by a calibration in steady wind.
+    pub(crate) fn flown(
+        &self,
+        seeds: std::ops::Range<u64>,
+        air: &[&str],
+        wind: &str,
+    ) -> Vec<Turbulence> {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path().join("campaign");
         let flights = self.plan(&root);
@@ -63,7 +68,7 @@ impl Fleet {
             let plan = folder.read_plan().unwrap();
             simulate(&host, folder, &plan, &Simulation::new(air, seed)).unwrap();
         };
-        fly(&flights[0], 1, &["still"]);
+        fly(&flights[0], 1, &[wind]);
         let mut work = Work::new(&root);
         find(&flights[0].0, None, &mut work).unwrap();
         for seed in seeds {
@@ -72,7 +77,7 @@ impl Fleet {
             for file in ["plan.json", "vehicle.toml", "template.toml"] {
                 fs::copy(flights[1].0.join(file), own.0.join(file)).unwrap();
             }
-            fly(&own, seed, air);
+            fly(&own, seed, &[air, &[wind]].concat());
             find(&own.0, None, &mut work).unwrap();
         }
         analysed(&work)
