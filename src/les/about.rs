@@ -32,8 +32,10 @@ pub struct About {
     pub points: [usize; 3],
     /// Distances of the points along x and y, m.
     pub spacing_m: [f64; 2],
-    /// Heights that all components have, above the show's ground, m.
+    /// Heights that all components have, above the show's ground, m: below 0 where the ground lies in the model.
     pub heights_m: (f64, f64),
+    /// Distance of the two lowest heights of w, m.
+    pub lowest_step_m: f64,
     /// First and last time, s, and their number.
     pub times_s: (f64, f64, usize),
     /// Lengths after which the model repeats itself, m.
@@ -65,7 +67,7 @@ impl About {
         } else {
             format!("{dx:.4} and {dy:.4}")
         };
-        let (low_m, high_m) = self.heights_m;
+        let (low_m, high_m) = (self.heights_m.0.max(0.0), self.heights_m.1);
         let (first_s, last_s, times) = self.times_s;
         let [lx, ly] = self.period_m;
         let repeats = if self.repeats {
@@ -97,9 +99,8 @@ impl About {
 
     /// What is said of heights below the model's lowest points, if these are high.
     pub fn caution(&self) -> Option<String> {
-        let (low_m, high_m) = self.heights_m;
-        let step_m = (high_m - low_m) / self.points[2].saturating_sub(1).max(1) as f64;
-        (low_m > 1.5 * step_m).then(|| {
+        let (low_m, _) = self.heights_m;
+        (low_m > 1.5 * self.lowest_step_m).then(|| {
             format!(
                 "the model's lowest points are {low_m:.1} m above the ground: below them the wind is that of the lowest \
                  points, and the vertical velocity falls to none at the ground"

@@ -13,9 +13,7 @@ use super::source::Source;
 use super::{LesError, Where, beside, known};
 use crate::base::file::read_whole;
 use crate::sim::air::GriddedAir;
-use crate::sim::air::gridded::{
-    Block, Component, Grid, GridSource, Heights, Passage, Placing, Points,
-};
+use crate::sim::air::gridded::{Block, Component, Grid, GridSource, Passage, Placing, Points};
 use crate::sim::air::spec::{AirSpec, towards};
 
 /// Largest mapping that is read, bytes.
@@ -132,6 +130,13 @@ impl Placed<'_> {
             points: [w.x.count, w.y.count, w.z.all_m().len()],
             spacing_m: [w.x.spacing_m, w.y.spacing_m],
             heights_m: heights_m(&grid.points, origin_m.z),
+            lowest_step_m: w
+                .z
+                .all_m()
+                .windows(2)
+                .map(|pair| pair[1] - pair[0])
+                .next()
+                .unwrap_or(0.0),
             times_s: (first_s, last_s, grid.times_s.len()),
             period_m: [w.x.period_m(), w.y.period_m()],
             repeats: grid.repeats,
@@ -155,13 +160,9 @@ fn nearest(times_s: &[f64], at_s: f64) -> usize {
     found.map_or(0, |(index, _)| index)
 }
 
-/// Heights above the show's ground that all components have; the lowest is that of w above the ground, as w ends there.
+/// Heights above the show's ground that all components have.
 fn heights_m(points: &[Points; 3], ground_m: f64) -> (f64, f64) {
-    let lowest = |heights: &Heights| {
-        let above = heights.all_m().iter().find(|m| **m >= ground_m);
-        above.copied().unwrap_or(f64::INFINITY)
-    };
-    let low_m = points.iter().map(|of| lowest(&of.z)).fold(f64::NEG_INFINITY, f64::max);
+    let low_m = points.iter().map(|of| of.z.ends_m().0).fold(f64::NEG_INFINITY, f64::max);
     let high_m = points.iter().map(|of| of.z.ends_m().1).fold(f64::INFINITY, f64::min);
     (low_m - ground_m, high_m - ground_m)
 }

@@ -20,7 +20,7 @@ pub(crate) fn provenance(
 ) -> Provenance {
     let mut paths = plans(&work.root, work.origin.unwrap_or(LogOrigin::Real));
     paths.extend(work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.clone()));
-    let inputs = paths
+    let mut inputs: Vec<InputFile> = paths
         .par_iter()
         .map(|path| {
             // A log that cannot be read is already named as missing by the analysis.
@@ -30,6 +30,7 @@ pub(crate) fn provenance(
             InputFile { path: shown.shown().to_string(), sha256 }
         })
         .collect();
+    inputs.extend(air_files(&work.root, work.origin.unwrap_or(LogOrigin::Real)));
     Provenance {
         program: made_by(),
         command: host.command(),
@@ -38,6 +39,25 @@ pub(crate) fn provenance(
         inputs,
         ..Provenance::default()
     }
+}
+
+/// Files that the air of simulated flights was read from, with the hashes that they had then: they may be large, and
+/// elsewhere.
+fn air_files(root: &Path, origin: LogOrigin) -> Vec<InputFile> {
+    if !campaign::is_campaign(root) {
+        return Vec::new();
+    }
+    let mut files: Vec<InputFile> = Vec::new();
+    for flight in campaign::flights(root).unwrap_or_default() {
+        let Ok(Some(record)) = flight.logs_of(origin).read_record() else { continue };
+        for air in record.air_files {
+            let file = InputFile { path: air.file, sha256: air.sha256 };
+            if files.iter().all(|there| there.path != file.path || there.sha256 != file.sha256) {
+                files.push(file);
+            }
+        }
+    }
+    files
 }
 
 /// What a campaign knows about its flights: plans, vehicles, flight records, and a study.

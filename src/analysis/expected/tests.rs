@@ -5,15 +5,15 @@ use crate::base::rng::{Purpose as Chance, stream};
 use crate::mission::resolve::{Override, resolve};
 use crate::sim::air::{Atmosphere as _, FieldScales, RandomField};
 
-fn plan(template: &str, overrides: &[(&str, f64)]) -> Plan {
+fn plan(template: &str, overrides: &[&str]) -> Plan {
     let overrides: Vec<Override> =
-        overrides.iter().map(|(key, value)| Override::new(key, *value)).collect();
+        overrides.iter().map(|text| Override::parse(text).unwrap()).collect();
     resolve(template, &overrides).unwrap().flights.remove(0).plan
 }
 
 #[test]
 fn one_drone_has_the_errors_of_lenschow() {
-    let plan = plan("hover", &[("grid.rows", 1.0), ("grid.columns", 1.0), ("duration_s", 611.0)]);
+    let plan = plan("hover", &["grid.rows=1", "grid.columns=1", "duration_s=611"]);
     let air = AssumedAir { integral_s: Some(30.0), sd_mps: Some(0.5) };
     let found = expected_errors(&plan, None, air).unwrap();
     assert!((found.measured_s - 600.0).abs() < 1e-9 && found.heights == 1, "{found:?}");
@@ -35,11 +35,10 @@ fn one_drone_has_the_errors_of_lenschow() {
 
 #[test]
 fn drones_apart_tell_more_and_drones_together_do_not() {
-    let of = |spacing_m: f64| {
-        let spacing = [("grid.spacing_m", spacing_m)];
-        expected_errors(&plan("hover", &spacing), None, AssumedAir::default()).unwrap()
+    let of = |spacing: &str| {
+        expected_errors(&plan("hover", &[spacing]), None, AssumedAir::default()).unwrap()
     };
-    let (close, far) = (of(1.0), of(500.0));
+    let (close, far) = (of("grid.spacing_m=1"), of("grid.spacing_m=500"));
     assert!(close.mean_mps.fleet > 0.95 * close.mean_mps.drone, "{close:?}");
     // 49 drones that see different eddies.
     assert!(far.mean_mps.fleet < 0.3 * far.mean_mps.drone, "{far:?}");
@@ -93,7 +92,7 @@ fn drawn_air_scatters_as_expected() {
             length_m: Vector3::repeat(scales.length_m),
             time_s: 1.0 / scales.decay_per_s,
             wind_mps: Vector3::new(scales.past_mps, 0.0, 0.0),
-            waves: 600,
+            waves: 2_400,
         };
         let field = RandomField::new(&drawn, &mut stream(seed, 0, Chance::Air));
         let records: Vec<Vec<f64>> = places_m
@@ -116,7 +115,7 @@ fn drawn_air_scatters_as_expected() {
         variances.push(square(&records[0]));
         fleet_variances.push(of_fleet(&square));
     }
-    // 200 draws tell a standard deviation to 5 %: three of these, and what steps of 3 s and 600 waves add.
+    // 200 draws tell a standard deviation to 5 %: three of these, and what steps of 3 s and a sum of waves add.
     for (what, expected, drawn) in [
         ("mean of one", expected.mean_mps.drone, sd(&means)),
         ("mean of the fleet", expected.mean_mps.fleet, sd(&fleet_means)),

@@ -99,6 +99,8 @@ fn a_map_flown_in_a_models_air_is_the_models_air() {
     assert_eq!(record.air, ["les:les.nc"]);
     assert_eq!(record.air_files[0].sha256, sha256(&bytes));
     assert_eq!(record.air_files[0].bytes, bytes.len() as u64);
+    let page = fs::read_to_string(folder.join("c/report/index.html")).unwrap();
+    assert!(page.contains("les.nc") && page.contains(&sha256(&bytes)), "the report names it, too");
     outside(folder, &hover);
 
     // The same flight in a file that has changed is another one.

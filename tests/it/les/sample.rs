@@ -111,6 +111,10 @@ impl Field {
     }
 
     /// A component on its points, z slowest and x fastest.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "the tables are by wave first, and by point then"
+    )]
     pub(crate) fn grid(&self, component: usize, after_s: f64) -> Vec<f32> {
         let [nx, ny, nz] = POINTS;
         let wind = [self.wind_mps[0], self.wind_mps[1], 0.0];
