@@ -52,7 +52,10 @@ pub(super) fn sentences(map: &UpdraftMap) -> Vec<String> {
         let more = posterior.filled.len() - slots.len();
         let more = if more == 0 { String::new() } else { format!(" and {more} more") };
         let noun = if posterior.filled.len() == 1 { "slot" } else { "slots" };
-        sentences.push(format!("Without a log: {words} ({noun} {}{more}).", slots.join(", ")));
+        sentences.push(format!(
+            "Without values of their own: {words} ({noun} {}{more}).",
+            slots.join(", ")
+        ));
     }
     match (&posterior.scales, &posterior.no_scales) {
         (Some(scales), _) => sentences.push(scale_words(scales)),
@@ -221,7 +224,7 @@ mod tests {
         let words = sentences(&map);
         assert_eq!(
             words[1],
-            "Without a log: 14 lost drones filled from their neighbours (slots 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 \
+            "Without values of their own: 14 lost drones filled from their neighbours (slots 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 \
              and 2 more)."
         );
         assert_eq!(words[2], "No scales of the air: a thermal␛[31m passed.");

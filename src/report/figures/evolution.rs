@@ -139,7 +139,7 @@ pub(in crate::report) fn figure(
         Some(_) => (
             "The air's 10 s means as all drones, seconds and the calibration together tell it; where \
              it is not known, it is hatched.",
-            if lost.is_empty() { "" } else { ", rings those without a log" },
+            if lost.is_empty() { "" } else { ", rings those without values of their own" },
         ),
         None => (
             "Running 10 s estimates, linear between the drones (Delaunay triangles), nothing outside \

@@ -90,7 +90,7 @@ pub(in crate::report) fn figure(
     }
     let name = format!("posterior-field-{key}");
     let title = format!("Posterior map between the drones, {}", clean(&flight.name));
-    let rings = if lost.is_empty() { "" } else { ", rings those without a log" };
+    let rings = if lost.is_empty() { "" } else { ", rings those without values of their own" };
     Some(Figure {
         svg: drawing.finish(&title),
         name,

@@ -57,7 +57,7 @@ pub(super) fn doubts(
 
 /// The plan and the seed of the calibration in the campaign that an analysis lies in.
 fn calibrated_in(path: &Path) -> Option<(Plan, Option<u64>)> {
-    let root = path.parent()?;
+    let root = if path.is_dir() { path } else { path.parent()? };
     let folders = campaign::is_campaign(root).then(|| campaign::flights(root).ok())??;
     let of_folder = |folder: &FlightFolder| {
         let plan = folder.read_plan().ok()?;

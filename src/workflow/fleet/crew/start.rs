@@ -45,7 +45,13 @@ impl<'a> Crew<'a> {
             .map_err(refused)?;
         self.until_taken(&mut start)?;
         self.host.news(&News::Start(start.time().map(GpsTime::total_ms)));
-        self.step(Step::Start, "Every drone has the start time: a person must authorize it");
+        let latest_s = options.authorize_before_s;
+        self.step(
+            Step::Start,
+            &format!(
+                "Every drone has the start time: a person must authorize it until {latest_s:.0} s before it"
+            ),
+        );
         Ok(start)
     }
 
