@@ -176,6 +176,13 @@ fn fleet_rows(found: &Turbulence) -> Vec<Value> {
     let skewness = |of: &Option<Component>| of.as_ref().and_then(|of| of.skewness);
     interval("Skewness of w", "S", &skewness(&found.vertical), "", "");
     interval(
+        "Updraft fraction",
+        "",
+        &found.updraft_fraction,
+        "",
+        "share of time and drones above the drone's mean",
+    );
+    interval(
         "Turbulent kinetic energy",
         "e",
         &found.kinetic_energy,

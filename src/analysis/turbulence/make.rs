@@ -40,6 +40,8 @@ const SHAPE_SE: f64 = 0.03;
 /// Relative standard error of the power that pulse and lean answer with, in each band: what is left of it against the air of
 /// the simulator (docs/products.md).
 const RESPONSE_SE: f64 = 0.08;
+/// A scale that is known worse than this is told of. Chosen.
+const ROUGH: f64 = 0.15;
 /// Weaker winds have no direction, and carry nothing past, m/s.
 const CALM_MPS: f64 = 0.5;
 /// Half the width of a normal 95 % interval, standard errors.
@@ -255,6 +257,13 @@ fn vertical(found: &mut Turbulence, drones: &[Drone<'_>], aligned: &[Aligned], c
     let Some(component) = component(&records, fleet_scale(drones), limit_hz, common) else {
         return;
     };
+    if component.scale_se > ROUGH {
+        found.absent.push(format!(
+            "the scale of w is known to {:.0} % alone, as the wind is another than the calibration's: calibrate in the wind of \
+             the measurement",
+            100.0 * component.scale_se
+        ));
+    }
     if component.scales.is_none() {
         found.absent.push(short("w", common.length_s, integral_time(&records)));
     }
@@ -373,6 +382,8 @@ fn component(
 
 fn instrument(noise: f64, scale_se: f64, highest_hz: f64, step_s: f64) -> Instrument {
     let transfer = Transfer { mean_s: step_s, ..Transfer::NONE };
+    // A line at the very end would be a band of its own.
+    let highest_hz = 0.999 * highest_hz;
     Instrument { transfer, noise, scale_se, response_se: RESPONSE_SE, highest_hz }
 }
 

@@ -55,7 +55,7 @@ fn decades(label: &str, values: &[f64]) -> Option<Axis> {
     let (low, high) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
     let power = |value: f64| 10_f64.powf(value);
     let [min, max] = [power(low.log10().floor()), power(high.log10().ceil())];
-    Some(Axis { label: label.to_owned(), min, max: max.max(10.0 * min), step: 1.0 })
+    Some(Axis { label: label.to_owned(), min, max: max.max(10.0 * min), step: 0.001 })
 }
 
 /// Spectra of w, and of u and v, with their bands.
@@ -229,10 +229,11 @@ fn covariance(found: &Turbulence, variance: Option<[f64; 3]>) -> Option<Panel> {
     };
     let marks: Vec<Mark> = found.distances.iter().map(of).collect();
     let own: Vec<Mark> =
-        variance.iter().map(|[value, low, high]| mark(0.0, *value, *low, *high)).collect();
+        variance.iter().map(|[value, ..]| mark(0.0, *value, *value, *value)).collect();
     let ends =
         || marks.iter().chain(&own).flat_map(|mark| [mark.y - mark.y_error, mark.y + mark.y_error]);
-    let y = Axis::around("covariance ((m/s)²)", ends().chain([0.0]), 0.05);
+    let bar = variance.iter().flat_map(|[_, low, high]| [*low, *high]);
+    let y = Axis::around("covariance ((m/s)²)", ends().chain(bar).chain([0.0]), 0.05);
     let farthest = marks.iter().map(|mark| mark.x).reduce(f64::max)?;
     let mut x =
         Axis::around("distance between drones (m)", [0.0, 1.03 * farthest].into_iter(), 1.0);
@@ -241,6 +242,10 @@ fn covariance(found: &Turbulence, variance: Option<[f64; 3]>) -> Option<Panel> {
     panel.legend_at(LegendPosition::InsideTopRight);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 0.8, "");
     panel.marks(&marks, VERMILLION, 4.5, MarkerShape::Circle);
+    // The interval of a variance is not symmetric.
+    if let Some([_, low, high]) = variance {
+        panel.line(&[(0.0, low), (0.0, high)], INK, 1.0, "");
+    }
     panel.marks(&own, INK, 5.5, MarkerShape::Square);
     panel.entry("pairs", VERMILLION, LegendShape::Circle, "");
     if !own.is_empty() {

@@ -7,7 +7,7 @@ use updraft::analysis::result::Turbulence;
 use updraft::blind::worlds::maps;
 use updraft::workflow::find::{Work, find};
 
-const SEEDS: std::ops::Range<u64> = 2101..2117;
+const SEEDS: std::ops::Range<u64> = 2101..2111;
 
 fn flown(kind: &str, seed: u64) -> Turbulence {
     let folder = tempfile::tempdir().unwrap();
@@ -48,13 +48,13 @@ fn a_foreign_plants_turbulence_is_measured() {
     let speeds: Vec<f64> =
         found.iter().filter_map(|one| Some(one.advection?.speed_mps.value / 3.0)).collect();
     println!("advection: {speeds:.2?}");
-    assert!(speeds.len() >= 8 && (median(speeds) - 1.0).abs() < 0.15);
+    assert!(speeds.len() >= 5 && (median(speeds) - 1.0).abs() < 0.15);
 }
 
 #[test]
 fn another_wind_than_the_calibrations_is_in_the_interval() {
     let found: Vec<Turbulence> =
-        (2201..2209).map(|seed| flown("turbulent-calibrated-calm", seed)).collect();
+        (2201..2207).map(|seed| flown("turbulent-calibrated-calm", seed)).collect();
     let variances: Vec<_> =
         found.iter().filter_map(|one| one.vertical.as_ref()?.variance).collect();
     let inside = variances.iter().filter(|of| of.low <= 0.25 && 0.25 <= of.high).count();

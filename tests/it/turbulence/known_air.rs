@@ -32,10 +32,12 @@ fn flown() -> Vec<Turbulence> {
     fleet.flown(SEEDS, &["von-karman:sd=0.5,length=50,modes=6000"], "wind:speed=3,from=240")
 }
 
-/// That the share of so many that hold agrees with one of these.
-fn assert_share(what: &str, held: usize, of: usize, [least, most]: [f64; 2]) {
+/// That the share of so many that hold agrees with one of these; in words.
+fn share(what: &str, held: usize, of: usize, [least, most]: [f64; 2]) -> String {
     let [low, high] = wilson(held, of);
-    assert!(high >= least && low <= most, "{what}: {held} of {of}, {low:.3} to {high:.3}");
+    let words = format!("{what}: {held} of {of}, {low:.3} to {high:.3}");
+    assert!(high >= least && low <= most, "{words}");
+    words
 }
 
 #[test]
@@ -50,7 +52,7 @@ fn gusts_of_known_statistics_are_measured() {
     assert!(variances.len() > 26, "{}", variances.len());
     assert!((off - 1.0).abs() < 0.1, "{off}");
     let inside = variances.iter().filter(|of| of.low <= truth && truth <= of.high).count();
-    assert_share("var(w)", inside, variances.len(), [0.91, 0.98]);
+    println!("{}", share("var(w)", inside, variances.len(), [0.91, 0.98]));
 
     let mut bands = BTreeMap::<u64, [usize; 2]>::new();
     let mut ratios = BTreeMap::<u64, Vec<f64>>::new();
@@ -71,7 +73,7 @@ fn gusts_of_known_statistics_are_measured() {
         );
     }
     let [held, of] = bands.values().fold([0, 0], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
-    assert_share("spectra", held, of, [0.90, 0.985]);
+    println!("{}", share("spectra", held, of, [0.90, 0.985]));
 
     let truth = dissipation();
     let rates: Vec<_> = found.iter().filter_map(|one| one.dissipation).collect();
@@ -80,7 +82,7 @@ fn gusts_of_known_statistics_are_measured() {
     assert!(rates.len() > 20, "{}", rates.len());
     assert!((off - 1.0).abs() < 0.25, "{off}");
     let held = rates.iter().filter(|of| of.low <= truth && truth <= of.high).count();
-    assert_share("dissipation", held, rates.len(), [0.85, 1.0]);
+    println!("{}", share("dissipation", held, rates.len(), [0.85, 1.0]));
 
     let speeds: Vec<f64> =
         found.iter().filter_map(|one| Some(one.advection?.speed_mps.value / WIND_MPS)).collect();
@@ -94,7 +96,7 @@ fn gusts_of_known_statistics_are_measured() {
             "horizontal: median {:.3}",
             median(variances.iter().map(|of| of.value / truth).collect())
         );
-        assert_share("horizontal", held, variances.len(), [0.91, 1.0]);
+        println!("{}", share("horizontal", held, variances.len(), [0.91, 1.0]));
     }
 }
 
