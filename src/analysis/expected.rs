@@ -36,7 +36,7 @@ const MOST_PAIRS: usize = 20_000;
 /// Separations are looked at once to this, m.
 const SAME_M: f64 = 0.1;
 
-/// What is assumed of the air, where it is not the usual.
+/// Scales of the air that somebody knows, in place of the usual ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AssumedAir {
     /// Integral time of w over a drone that hovers, s; `None`: that of convective air at its height in a wind of 3 m/s.

@@ -1,4 +1,4 @@
-//! What a model's output covers, and whether a flight is inside of it.
+//! Extent of a model's output, and the check that a flight is inside of it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ const LOW_M: f64 = 1.0;
 /// Air of a model that was opened.
 #[derive(Clone)]
 pub struct Les {
-    /// The air.
+    /// Motion of the air in the show.
     pub air: Arc<GriddedAir>,
     /// Extent of the model, and its place in the show.
     pub about: About,
@@ -97,7 +97,7 @@ impl About {
         )
     }
 
-    /// What is said of heights below the model's lowest points, if these are high.
+    /// Caution about heights below the model's lowest points, if these are high.
     pub fn caution(&self) -> Option<String> {
         let (low_m, _) = self.heights_m;
         (low_m > 1.5 * self.lowest_step_m).then(|| {

@@ -21,9 +21,9 @@ pub struct ComponentMap {
     pub x: Option<String>,
     /// Coordinate along y.
     pub y: Option<String>,
-    /// Heights.
+    /// Coordinate along the vertical.
     pub z: Option<String>,
-    /// Times.
+    /// Coordinate of the times.
     pub time: Option<String>,
 }
 
@@ -44,7 +44,7 @@ pub struct LesMap {
     pub u: ComponentMap,
     /// Velocity along y, which is to the left of x.
     pub v: ComponentMap,
-    /// Velocity upwards.
+    /// Velocity along the vertical, up positive.
     pub w: ComponentMap,
     /// Length of one unit of the coordinates, m; absent: by their attribute `units`, else 1.
     pub length_unit_m: Option<f64>,

@@ -3,7 +3,7 @@
 /// Share of the spacing by which points of an equidistant axis may be off: coordinates come as 32-bit floats.
 const UNEVEN: f64 = 2e-3;
 
-/// Equidistant points.
+/// Axis whose points are equidistant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regular {
     /// First point, m.

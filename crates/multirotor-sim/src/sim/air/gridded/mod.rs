@@ -17,11 +17,11 @@ use blocks::{Blocks, Held, HeldBlock, Key};
 /// Component of the velocity along an axis of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Component {
-    /// Along x.
+    /// Velocity along the model's x axis.
     U,
-    /// Along y, which is to the left of x.
+    /// Velocity along the model's y axis, which is to the left of x.
     V,
-    /// Upwards.
+    /// Vertical velocity, up positive.
     W,
 }
 
