@@ -98,7 +98,8 @@ pub fn open(spec: &crate::sim::air::spec::AirSpec, _place: Where) -> Result<Les,
     ))
 }
 
-/// Files of a specification, in the order of the components; the mapping is the last one.
-pub(crate) fn beside(file: &Path, name: &str) -> PathBuf {
+/// Path of a file that lies beside another.
+#[cfg(feature = "les")]
+fn beside(file: &Path, name: &str) -> PathBuf {
     file.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name))
 }
