@@ -3,6 +3,7 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
+use crate::numeric::extent;
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
@@ -27,16 +28,28 @@ struct WayPoint {
     truth_mps: Option<f64>,
 }
 
+/// Whether a drone flew further up and down than along the ground.
+fn is_upright(drone: &DroneUpdraft) -> bool {
+    let range = |axis: usize| {
+        let places = drone.track_m.iter().flatten().map(|place| place[axis]);
+        extent(places).map_or(0.0, |(low, high)| high - low)
+    };
+    range(2) > range(0).max(range(1))
+}
+
 /// The values of a drone over the way that it flew; a point that cannot be drawn breaks the line.
 fn points(map: &UpdraftMap, drone: &DroneUpdraft) -> Vec<WayPoint> {
     let mut points = Vec::new();
     let mut way_m = 0.0;
     let mut last: Option<[f64; 3]> = None;
     let mut last_s = f64::NEG_INFINITY;
+    // Height counts where a drone flew up and down: along the ground its jitter would be a way, too.
+    let is_upright = is_upright(drone);
     for (index, time_s) in map.time_s.iter().enumerate() {
         let Some(place) = drone.track_m.get(index).copied().flatten() else { continue };
         if let Some(last) = last {
-            way_m += f64::hypot(place[0] - last[0], place[1] - last[1]);
+            let along_m = f64::hypot(place[0] - last[0], place[1] - last[1]);
+            way_m += if is_upright { along_m.hypot(place[2] - last[2]) } else { along_m };
         }
         last = Some(place);
         let Some(value_mps) = drone.updraft_mps.get(index).copied().flatten() else { continue };
