@@ -70,6 +70,9 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     tiles
 }
 
+/// An error that is so much larger than another is told with its reason.
+const WIDER: f64 = 1.5;
+
 /// Tiles of a map: all drones together where there is a posterior, and then each drone alone beside it.
 fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
     let Some((map, air)) = flight.map.as_ref().and_then(|map| Some((map, fleet_air(map)?))) else {
@@ -87,10 +90,16 @@ fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
     }
     let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
     let whose = if together.is_some() { ": each drone alone, averaged" } else { "" };
+    let wider = if together.is_some_and(|fleet| fleet.se > WIDER * air.error.se) {
+        "; the wider interval of all drones together counts: it also weighs how much the air of the \
+         calibration may have moved its zero"
+    } else {
+        ""
+    };
     tiles.push((
         signed(air.mean, decimal_places(Estimate::new(air.mean, air.error.se))),
         format!("mean vertical air speed, {name}{whose}"),
-        format!("{}{spread}", air.error.words(2)),
+        format!("{}{spread}{wider}", air.error.words(2)),
     ));
     if let Some(alone) = air.rms_error {
         // Of values over 10 s it is another number, which the text below the map tells.
