@@ -33,7 +33,7 @@ const DEEPEST: usize = 8;
 pub struct Link {
     /// Title of the page.
     pub title: &'static str,
-    /// Its address at this server.
+    /// Address of the page at this server.
     pub href: String,
 }
 

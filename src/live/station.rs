@@ -228,7 +228,7 @@ impl Station {
         }
     }
 
-    /// What was said before this station was opened, the oldest first.
+    /// Takes sentences that were said before this station was opened, the oldest first.
     pub fn recall(&self, said: Vec<Said>) {
         let mut now = self.lock();
         for said in said {

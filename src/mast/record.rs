@@ -37,7 +37,7 @@ pub struct MastRecord {
     pub w: Series,
     /// Wind towards east and north, m/s, if measured.
     pub wind: Option<[Series; 2]>,
-    /// What must be known of how it was read.
+    /// Doubts about how it was read, a sentence each.
     pub notes: Vec<String>,
 }
 

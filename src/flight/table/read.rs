@@ -79,7 +79,7 @@ pub struct Columns {
     pub start: Option<GpsTime>,
     /// Quantities, in the order of the wish, with their names.
     pub channels: Vec<(&'static str, Series)>,
-    /// What must be known of how the table was read, a sentence each.
+    /// Doubts about how the table was read, a sentence each.
     pub warnings: Vec<String>,
 }
 

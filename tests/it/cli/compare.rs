@@ -68,7 +68,7 @@ fn what_cannot_be_compared_is_refused() {
     fs::create_dir_all(bench.path("copy")).unwrap();
     fs::copy(bench.path("monday/analysis.json"), bench.path("copy/analysis.json")).unwrap();
     says(2, &["monday", "copy"], "are the same analysis");
-    says(2, &["monday"], "2 values required");
+    says(2, &["monday"], "give two campaigns or more, or one with --mast");
     says(1, &["monday", "nowhere"], "nowhere");
     says(5, &["monday", "monday/hover"], "has no analysis.json");
     says(2, &["monday", "tuesday", "-o", "monday"], "would be overwritten");

@@ -30,7 +30,7 @@ fn analysed() -> Bench {
     let utc = "format = \"datetime\"\nutc_offset_h = 0";
     fs::write(bench.path("map.toml"), MAPPING.replacen("format = \"datetime\"", utc, 1)).unwrap();
     fs::write(bench.path("mast.toml"), MAST).unwrap();
-    let zero = ["--zero", "0..150s", "--vehicle", "phantom4", "--no-report"];
+    let zero = ["--zero", "0..150s", "--vehicle", "phantom4"];
     bench.expect(0, &[&["analyze", "--csv", "map.toml", "-o", "out"], &zero[..]].concat());
     bench
 }
