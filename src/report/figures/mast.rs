@@ -108,7 +108,7 @@ fn by_frequency(flight: &MastFlight, key: &str, format: Format) -> Option<Figure
         label: "frequency (Hz)".to_owned(),
         min: 0.9 * ends().reduce(f64::min)?,
         max: 1.1 * ends().reduce(f64::max)?,
-        step: 0.01,
+        step: 0.001,
     };
     let mut spectra = Panel::new("(a) Spectra", x.clone(), y.clone());
     spectra.logarithmic();

@@ -46,7 +46,7 @@ fn sheet(panels: Vec<Panel>, format: Format) -> Sheet {
 }
 
 fn frequency_axis(low: f64, high: f64) -> Axis {
-    Axis { label: "frequency (Hz)".to_owned(), min: 0.9 * low, max: 1.1 * high, step: 0.01 }
+    Axis { label: "frequency (Hz)".to_owned(), min: 0.9 * low, max: 1.1 * high, step: 0.001 }
 }
 
 /// Powers of ten around values; `None` of none above 0.
