@@ -10,6 +10,8 @@ use crate::analysis::result::{
 
 use super::figures::turbulence::figures;
 use super::fill::{common, fill};
+#[cfg(any(feature = "paper-figures", test))]
+use super::format::Format;
 use super::page::{Gallery, flight_key};
 use super::text::{clean, count, estimate, fixed, sentence};
 use super::{Provenance, Report, ReportError};
@@ -29,15 +31,7 @@ pub fn render_turbulence(
     provenance: &Provenance,
 ) -> Result<Option<Report>, ReportError> {
     let mut gallery = Gallery::default();
-    let flights: Vec<Value> = analysis
-        .flights
-        .iter()
-        .enumerate()
-        .filter_map(|(index, flight)| {
-            let found = flight.turbulence.as_ref()?;
-            Some(section(flight, &flight_key(analysis, index), found, &mut gallery))
-        })
-        .collect();
+    let flights = sections(analysis, &mut gallery);
     if flights.is_empty() {
         return Ok(None);
     }
@@ -52,6 +46,24 @@ pub fn render_turbulence(
     };
     let html = fill(TURBULENCE_PAGE, PAGE, values)?;
     Ok(Some(Report { html, figures: gallery.files, data: Vec::new() }))
+}
+
+/// The figures of the page alone, drawn for a format.
+#[cfg(any(feature = "paper-figures", test))]
+pub(super) fn figures_of(analysis: &Analysis, format: Format) -> Vec<(String, String)> {
+    let mut gallery = Gallery::of(format);
+    sections(analysis, &mut gallery);
+    gallery.files
+}
+
+/// Sections of the flights that have something to tell; their figures are put into `gallery`, too.
+fn sections(analysis: &Analysis, gallery: &mut Gallery) -> Vec<Value> {
+    let flights = analysis.flights.iter().enumerate();
+    let told = flights.filter_map(|(index, flight)| {
+        let found = flight.turbulence.as_ref()?;
+        Some(section(flight, &flight_key(analysis, index), found, gallery))
+    });
+    told.collect()
 }
 
 /// A value with as many decimals as three significant digits need.

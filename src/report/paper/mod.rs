@@ -12,7 +12,7 @@ use svg2pdf::usvg::Error as SvgError;
 use thiserror::Error;
 
 use super::format::{Format, PAGE_HEIGHT_MM};
-use super::{Basemap, Beside, compare_page, gap_page, mast_page, page};
+use super::{Basemap, Beside, compare_page, gap_page, mast_page, page, turbulence_page};
 use crate::analysis::result::Analysis;
 use crate::compare::result::Comparison;
 use crate::gap::Verdict;
@@ -67,7 +67,10 @@ pub fn of_analysis(analysis: &Analysis, beside: Beside<'_>, width_mm: f64) -> Ve
     // PDF knows no WebP.
     let is_known = |basemap: &&Basemap| !basemap.address().starts_with("data:image/webp");
     let beside = Beside { basemap: beside.basemap.filter(is_known), ..beside };
-    drawn(page::figures(analysis, beside, Format::column(width_mm)), width_mm)
+    let format = Format::column(width_mm);
+    let mut figures = page::figures(analysis, beside, format);
+    figures.extend(turbulence_page::figures_of(analysis, format));
+    drawn(figures, width_mm)
 }
 
 /// The figures of a verdict's page for a column of `width_mm`.
