@@ -26,14 +26,21 @@ fn a_foreign_plants_turbulence_is_measured() {
     let truth = 0.25;
     let variances: Vec<_> =
         found.iter().filter_map(|one| one.vertical.as_ref()?.variance).collect();
-    let off = median(variances.iter().map(|of| of.value / truth).collect());
+    let mut ratios: Vec<f64> = variances.iter().map(|of| of.value / truth).collect();
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios.len() >= 8, "{ratios:?}");
+    let off = median(ratios.clone());
     let inside = variances.iter().filter(|of| of.low <= truth && truth <= of.high).count();
     let [low, high] = wilson(inside, variances.len());
     println!(
         "var(w)/truth: median {off:.3}, inside {inside} of {}, {low:.2} to {high:.2}",
         variances.len()
     );
-    assert!((off - 1.0).abs() < 0.1, "{off}");
+    // A median of nine or ten is known as well as the second and the last but one are apart (96 to 98 %).
+    let between = ratios[1]..=ratios[ratios.len() - 2];
+    assert!(*between.start() <= 1.1 && *between.end() >= 0.9, "{ratios:.2?}");
+    // Nor is it a third off, however that may be.
+    assert!((0.75..1.33).contains(&off), "{ratios:.2?}");
     assert!(high >= 0.91, "{inside} of {}", variances.len());
 
     let mut off = Vec::new();
