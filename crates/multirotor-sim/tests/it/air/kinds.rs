@@ -209,8 +209,10 @@ fn the_same_seed_gives_the_same_air_on_any_number_of_threads() {
 }
 
 fn any_spec() -> impl Strategy<Value = String> {
-    (0..KINDS.len()).prop_flat_map(|index| {
-        let kind = &KINDS[index];
+    // Output of a model needs its file: tests/it/les of the package makes one.
+    let drawn: Vec<_> = KINDS.iter().filter(|kind| kind.name != "les").collect();
+    (0..drawn.len()).prop_flat_map(move |index| {
+        let kind = drawn[index];
         let keys: Vec<_> = kind
             .keys
             .iter()
