@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::base::file::open_regular;
+
 /// First part of their addresses.
 pub const PREFIX: &str = "/files/";
 
@@ -120,10 +122,8 @@ pub fn open(root: &Path, path: &str) -> Option<(File, &'static str, u64)> {
     if !is_served(&parts) {
         return None;
     }
-    let path = inside(root, &parts).ok()??;
-    let file = File::open(path).ok()?;
-    let known = file.metadata().ok()?;
-    known.is_file().then_some((file, media, known.len()))
+    let (file, known) = open_regular(&inside(root, &parts).ok()??).ok()?;
+    Some((file, media, known.len()))
 }
 
 /// A page with links to the files of a folder that may be served (its address ends with a slash); `None`: there is none.

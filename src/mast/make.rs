@@ -15,7 +15,9 @@ use super::result::{
 };
 use crate::analysis::result::Analysis;
 use crate::base::frame::{Geodetic, ShowFrame};
+use crate::numeric;
 use crate::products::fields::{FieldRow, rows};
+use crate::products::iso;
 
 /// Time over which both are averaged, s.
 pub const MEAN_S: f64 = 10.0;
@@ -156,10 +158,10 @@ fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight
         return Err(format!(
             "{both} s are in both records, and {FEWEST_SECONDS} are the least: the flight is from {} to {}, the mast's record \
              from {} to {}",
-            utc(from * 1000),
-            utc(to * 1000),
-            utc(first),
-            utc(last)
+            iso(from * 1000),
+            iso(to * 1000),
+            iso(first),
+            iso(last)
         ));
     }
     if let Some(place) = mast.place_deg {
@@ -261,8 +263,7 @@ fn fleet(drones: &[Drone], seconds: &[i64]) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn mean_of(values: &[f64]) -> Option<f64> {
-    let known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
-    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    numeric::mean(values.iter().filter(|value| value.is_finite()))
 }
 
 fn variance_of(values: &[f64]) -> f64 {
@@ -340,8 +341,4 @@ fn distance_m([lat_deg, lon_deg]: [f64; 2], other: [f64; 2]) -> f64 {
     let frame = ShowFrame { origin, orientation_deg: 0.0 };
     let place = frame.from_geodetic(Geodetic { lat_deg: other[0], lon_deg: other[1], amsl_m: 0.0 });
     place.x.hypot(place.y)
-}
-
-fn utc(ms: i64) -> String {
-    crate::products::iso(ms)
 }

@@ -129,16 +129,8 @@ impl MastMapping {
         if self.schema != SCHEMA {
             return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
         }
-        if !self.delimiter.is_ascii() {
-            return Some(format!("delimiter {:?} must be one ASCII character", self.delimiter));
-        }
-        for (name, channel) in self.wish().channels {
-            if channel.columns.is_empty() {
-                return Some(format!("{name}: columns is empty; name at least one"));
-            }
-            if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
-                return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
-            }
+        if let Some(reason) = self.wish().refusal() {
+            return Some(reason);
         }
         if self.u.is_some() != self.v.is_some() {
             return Some("u and v are given both or not at all".to_owned());
@@ -152,9 +144,6 @@ impl MastMapping {
         }
         if !within(self.height_m, 1e4) {
             return Some("height_m is the height above the ground, m".to_owned());
-        }
-        if !within(self.time.utc_offset_h, 26.0) {
-            return Some("time: utc_offset_h must be within 26 h: local time less UTC".to_owned());
         }
         None
     }

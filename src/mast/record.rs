@@ -1,12 +1,11 @@
 //! The record of a mast: vertical air speed and wind at times in UTC.
 
-use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::MastError;
 use super::mapping::MastMapping;
-use crate::base::file::FileError;
+use crate::base::file::{FileError, open_named};
 use crate::flight::Series;
 use crate::flight::table::read_columns;
 use crate::numeric::median;
@@ -103,7 +102,7 @@ impl MastRecord {
 /// The description of a table by the names of its columns.
 fn by_heads(path: &Path) -> Result<MastMapping, MastError> {
     let failed = |error| FileError::new("read", path, error);
-    let file = File::open(path).map_err(failed)?;
+    let file = open_named(path).map_err(failed)?;
     let mut lines = BufReader::new(file.take(HEAD_BYTES)).lines();
     let mut next = || lines.next().transpose().map_err(failed).map(Option::unwrap_or_default);
     let cells = |line: &str| -> Vec<String> {

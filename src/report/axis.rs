@@ -56,6 +56,20 @@ impl Axis {
         Self { label: "show time (s)".to_owned(), min, max: high, step }
     }
 
+    /// A logarithmic axis of frequencies from `low` to `high`, Hz.
+    pub(super) fn frequencies(low: f64, high: f64) -> Self {
+        Self { label: "frequency (Hz)".to_owned(), min: 0.9 * low, max: 1.1 * high, step: 0.001 }
+    }
+
+    /// A logarithmic axis that ends on powers of ten around values; `None` of none above 0.
+    pub(super) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Option<Self> {
+        let known = values.filter(|value| usable(*value) && *value > 0.0);
+        let (low, high) = numeric::extent(known)?;
+        let power = |value: f64| 10_f64.powf(value);
+        let [min, max] = [power(low.log10().floor()), power(high.log10().ceil())];
+        Some(Self { label: label.to_owned(), min, max: max.max(10.0 * min), step: 0.001 })
+    }
+
     /// Tick labels with just the decimals that the step needs.
     pub(super) fn format(&self) -> TickFormat {
         let decimals = decimals_of(self.step);

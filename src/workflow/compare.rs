@@ -150,7 +150,7 @@ fn escaped(part: &str) -> String {
 }
 
 /// A page of one campaign must not be replaced by one of several.
-fn refuse_output(output: &Path) -> Result<(), WorkflowError> {
+pub(super) fn refuse_output(output: &Path) -> Result<(), WorkflowError> {
     if is_campaign(output) || output.join("analysis.json").exists() {
         return Err(WorkflowError::Usage(format!(
             "{} holds a campaign or its analysis, whose report would be overwritten; give the comparison another \

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::analysis_file::AnalysisFile;
+use super::compare::refuse_output;
 use super::error::WorkflowError;
 use super::hashes::Hashes;
 use super::host::Host;
 use super::made_by;
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
-use crate::campaign::{is_campaign, to_json};
+use crate::campaign::to_json;
 use crate::mast::{MastComparison, MastError, MastRecord, compare};
 use crate::report::{self, InputFile, Provenance};
 
@@ -79,16 +80,4 @@ fn failed(error: MastError) -> WorkflowError {
         MastError::Nothing { .. } => WorkflowError::Nothing(error.to_string()),
         _ => WorkflowError::Usage(error.to_string()),
     }
-}
-
-/// A campaign's own page must not be replaced.
-fn refuse_output(output: &Path) -> Result<(), WorkflowError> {
-    if is_campaign(output) || output.join("analysis.json").exists() {
-        return Err(WorkflowError::Usage(format!(
-            "{} holds a campaign or its analysis, whose report would be overwritten; give the comparison another \
-             folder with --output",
-            output.shown()
-        )));
-    }
-    Ok(())
 }

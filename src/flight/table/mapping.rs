@@ -55,9 +55,6 @@ pub struct Mapping {
     pub flights: Vec<TableFlight>,
 }
 
-/// No local time is further from UTC, h.
-const FURTHEST_ZONE_H: f64 = 26.0;
-
 /// Column of times, and its format.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -189,21 +186,8 @@ impl Mapping {
         if self.schema != SCHEMA {
             return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
         }
-        if !self.delimiter.is_ascii() {
-            return Some(format!("delimiter {:?} must be one ASCII character", self.delimiter));
-        }
-        for (name, channel) in self.channels() {
-            if channel.columns.is_empty() {
-                return Some(format!("{name}: columns is empty; name at least one"));
-            }
-            if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
-                return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
-            }
-        }
-        if self.time.utc_offset_h.is_some_and(|h| !(h.is_finite() && h.abs() <= FURTHEST_ZONE_H)) {
-            return Some(format!(
-                "time: utc_offset_h must be within {FURTHEST_ZONE_H} h: local time less UTC"
-            ));
+        if let Some(reason) = self.wish().refusal() {
+            return Some(reason);
         }
         if self.truth_distance_m.is_some_and(|m| !(m.is_finite() && m >= 0.0)) {
             return Some("truth_distance_m must be a distance, m, not below 0".to_owned());

@@ -21,6 +21,8 @@ const MOST_BYTES: u64 = 8 << 30;
 const LONGEST_LINE: usize = 1 << 20;
 /// No time is further from its zero, s: thirty thousand years.
 const LATEST_S: f64 = 1e12;
+/// No local time is further from UTC, h.
+const FURTHEST_ZONE_H: f64 = 26.0;
 /// Fewer rows are no flight.
 const FEWEST_ROWS: usize = 20;
 
@@ -70,6 +72,30 @@ pub struct Wish<'a> {
     pub time: &'a TimeColumn,
     /// Quantities, each with its name in messages.
     pub channels: Vec<(&'static str, &'a Channel)>,
+}
+
+impl Wish<'_> {
+    /// Reason that nothing can be read by this wish; `None`: it can be used.
+    pub fn refusal(&self) -> Option<String> {
+        if !self.delimiter.is_ascii() {
+            return Some(format!("delimiter {:?} must be one ASCII character", self.delimiter));
+        }
+        for (name, channel) in &self.channels {
+            if channel.columns.is_empty() {
+                return Some(format!("{name}: columns is empty; name at least one"));
+            }
+            if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
+                return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
+            }
+        }
+        let zone_h = self.time.utc_offset_h;
+        if zone_h.is_some_and(|h| !(h.is_finite() && h.abs() <= FURTHEST_ZONE_H)) {
+            return Some(format!(
+                "time: utc_offset_h must be within {FURTHEST_ZONE_H} h: local time less UTC"
+            ));
+        }
+        None
+    }
 }
 
 /// Columns of a table as series; time counts from the first row.

@@ -45,15 +45,19 @@ impl Door {
         }
     }
 
+    /// The `Host` of a request, if it is one of this server's.
+    fn own_host<'a>(&self, request: &'a Request) -> Result<&'a str, Status> {
+        let host = request.host.as_deref().ok_or(Status::BadRequest)?;
+        if self.is_own(host) { Ok(host) } else { Err(Status::Forbidden) }
+    }
+
     /// Refuses who may not read the campaign's files: the secret in their address is what lets in, from wherever the
     /// request comes, as pages in a sandbox are of no site. The operator's secret belongs into no address.
     ///
     /// # Errors
     /// The status to answer with.
     pub fn admit_reader(&self, request: &Request, secret: &str) -> Result<(), Status> {
-        if !self.is_own(request.host.as_deref().ok_or(Status::BadRequest)?) {
-            return Err(Status::Forbidden);
-        }
+        self.own_host(request)?;
         if request.method != Method::Get {
             return Err(Status::NotAllowed);
         }
@@ -68,10 +72,7 @@ impl Door {
     /// # Errors
     /// The status to answer with.
     pub fn admit(&self, request: &Request) -> Result<(), Status> {
-        let host = request.host.as_deref().ok_or(Status::BadRequest)?;
-        if !self.is_own(host) {
-            return Err(Status::Forbidden);
-        }
+        let host = self.own_host(request)?;
         let own = |origin: &str| origin.strip_prefix("http://") == Some(host);
         match &request.origin {
             Some(origin) if !own(origin) => return Err(Status::Forbidden),

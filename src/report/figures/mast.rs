@@ -3,8 +3,6 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
-use turbulence_statistics::spectrum::Band;
-
 use crate::mast::matched::averages;
 use crate::mast::result::MastFlight;
 use crate::report::Figure;
@@ -91,25 +89,11 @@ fn over_time(flight: &MastFlight, key: &str, format: Format) -> Figure {
     }
 }
 
-/// Powers of ten around densities.
-fn decades(bands: &[&[Band]]) -> Option<Axis> {
-    let all = || bands.iter().copied().flatten().map(|band| band.density).filter(|d| *d > 0.0);
-    let (low, high) = (all().reduce(f64::min)?, all().reduce(f64::max)?);
-    let power = |value: f64| 10_f64.powf(value);
-    let [min, max] = [power(low.log10().floor()), power(high.log10().ceil())];
-    let label = "density ((m/s)²/Hz)".to_owned();
-    Some(Axis { label, min, max: max.max(10.0 * min), step: 1.0 })
-}
-
 fn by_frequency(flight: &MastFlight, key: &str, format: Format) -> Option<Figure> {
-    let y = decades(&[&flight.mast_spectrum, &flight.drone_spectrum])?;
+    let densities = flight.mast_spectrum.iter().chain(&flight.drone_spectrum);
+    let y = Axis::decades("density ((m/s)²/Hz)", densities.map(|band| band.density))?;
     let ends = || flight.mast_spectrum.iter().map(|band| band.frequency_hz);
-    let x = Axis {
-        label: "frequency (Hz)".to_owned(),
-        min: 0.9 * ends().reduce(f64::min)?,
-        max: 1.1 * ends().reduce(f64::max)?,
-        step: 0.001,
-    };
+    let x = Axis::frequencies(ends().reduce(f64::min)?, ends().reduce(f64::max)?);
     let mut spectra = Panel::new("(a) Spectra", x.clone(), y.clone());
     spectra.logarithmic();
     spectra.legend_at(LegendPosition::InsideBottomLeft);

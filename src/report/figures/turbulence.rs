@@ -10,7 +10,7 @@ use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, GREEN, INK, MUTED, VERMILLION, sequential};
 use crate::report::format::Format;
 use crate::report::sheet::Sheet;
-use crate::report::text::{clean, fixed, usable};
+use crate::report::text::{clean, fixed};
 
 /// Size of a panel, pixels.
 const PANEL: [f64; 2] = [518.0, 350.0];
@@ -45,19 +45,6 @@ fn sheet(panels: Vec<Panel>, format: Format) -> Sheet {
     Sheet::of(format, [width, PANEL[1] + 4.0], panels)
 }
 
-fn frequency_axis(low: f64, high: f64) -> Axis {
-    Axis { label: "frequency (Hz)".to_owned(), min: 0.9 * low, max: 1.1 * high, step: 0.001 }
-}
-
-/// Powers of ten around values; `None` of none above 0.
-fn decades(label: &str, values: &[f64]) -> Option<Axis> {
-    let known = || values.iter().copied().filter(|value| usable(*value) && *value > 0.0);
-    let (low, high) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
-    let power = |value: f64| 10_f64.powf(value);
-    let [min, max] = [power(low.log10().floor()), power(high.log10().ceil())];
-    Some(Axis { label: label.to_owned(), min, max: max.max(10.0 * min), step: 0.001 })
-}
-
 /// Spectra of w, and of u and v, with their bands.
 fn spectra((key, flight): &(&str, String), found: &Turbulence, format: Format) -> Option<Figure> {
     let up = found.vertical.as_ref()?;
@@ -66,9 +53,9 @@ fn spectra((key, flight): &(&str, String), found: &Turbulence, format: Format) -
     let of_horizontal = horizontal.iter().filter_map(|(of, ..)| of.as_ref());
     let all = || of_horizontal.clone().chain([up]).flat_map(|of| &of.spectrum);
     let densities: Vec<f64> = all().map(|band| band.density).collect();
-    let y = decades("density ((m/s)²/Hz)", &densities)?;
+    let y = Axis::decades("density ((m/s)²/Hz)", densities.iter().copied())?;
     let ends = all().map(|band| band.frequency_hz);
-    let x = frequency_axis(ends.clone().reduce(f64::min)?, ends.reduce(f64::max)?);
+    let x = Axis::frequencies(ends.clone().reduce(f64::min)?, ends.reduce(f64::max)?);
     let mut first = Panel::new("(a) w, up", x.clone(), y.clone());
     first.logarithmic();
     first.legend_at(LegendPosition::InsideBottomLeft);
@@ -173,7 +160,7 @@ fn cospectrum(
         band.iter().flat_map(|(_, low, high)| [*low, *high]),
         0.01,
     );
-    let x = frequency_axis(band.first()?.0, band.last()?.0);
+    let x = Axis::frequencies(band.first()?.0, band.last()?.0);
     let mut panel = Panel::new("u and w", x.clone(), y);
     panel.logarithmic_x();
     panel.legend_at(LegendPosition::InsideBottomLeft);
@@ -264,7 +251,7 @@ fn few(distances: &[AtDistance]) -> Vec<&AtDistance> {
 fn coherence(few: &[&AtDistance]) -> Option<Panel> {
     let all = || few.iter().flat_map(|at| &at.coherence);
     let ends = || all().map(|band| band.frequency_hz);
-    let x = frequency_axis(ends().reduce(f64::min)?, ends().reduce(f64::max)?);
+    let x = Axis::frequencies(ends().reduce(f64::min)?, ends().reduce(f64::max)?);
     let y = Axis { label: "squared coherence".to_owned(), min: 0.0, max: 1.0, step: 0.2 };
     let mut panel = Panel::new("(b) Coherence by frequency", x, y);
     panel.logarithmic_x();
