@@ -20,6 +20,7 @@ use super::input::{FlightInput, LogInput, TruthSeries};
 use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf, Symbol};
+use super::laws_of_others;
 use super::levelled;
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
@@ -155,6 +156,7 @@ pub fn analyze(
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
         title: title.to_owned(),
         flights,
+        laws_from: None,
         warnings,
     })
 }
@@ -538,6 +540,7 @@ fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
     warnings.extend(battery.and_then(|found| battery_caution(map, found)));
     let is_plain = shared.aware.is_none() && shared.input.level.is_none();
     warnings.extend(is_plain.then_some(Warning::PlainMap));
+    warnings.extend(shared.map_reference.and_then(|laws| laws_of_others::doubt(map, laws)));
     warnings.extend(map.is_scan().then_some(Warning::Scan));
     warnings
 }

@@ -104,7 +104,7 @@ pub enum Quality {
     LowBattery,
     /// The log has a gap: no values.
     Gap,
-    /// The log ends before the hover does: no values behind.
+    /// The log ends, or the drone comes down, before the hover does: no values behind.
     Incomplete,
     /// The drone moved up or down, or did not hold the commanded speed: no values.
     Manoeuvre,

@@ -34,6 +34,7 @@ mod kind;
 mod kriging;
 mod ladder;
 pub mod law;
+mod laws_of_others;
 pub mod lean_table;
 pub mod level;
 mod levelled;

@@ -32,6 +32,7 @@ pub use super::wind_legs::{WindLeg, WindLegs};
 pub use super::window::{Rejection, WindowStats};
 use crate::base::estimate::Estimate;
 use crate::base::sentence::Sentence;
+use crate::base::time::GpsTime;
 use crate::flight::{Clock, Indicator};
 use crate::mission::plan::Purpose;
 
@@ -49,8 +50,27 @@ pub struct Analysis {
     pub title: String,
     /// The flights, calibration first.
     pub flights: Vec<FlightAnalysis>,
+    /// The analysis whose laws measure, where they are not those of a flight of this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laws_from: Option<LawsFrom>,
     /// What is doubtful about the whole.
     pub warnings: Vec<Warning>,
+}
+
+/// An earlier analysis whose laws are held.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LawsFrom {
+    /// Path of its file, as it was given.
+    pub path: String,
+    /// SHA-256 of that file.
+    pub sha256: String,
+    /// Its title.
+    pub title: String,
+    /// Number of drones that have laws in its calibration.
+    pub drones: usize,
+    /// GPS time of show time 0 of that calibration, as the middle one of its logs has it; absent: they have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<GpsTime>,
 }
 
 /// One flight of the fleet.

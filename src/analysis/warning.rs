@@ -128,6 +128,15 @@ pub enum Warning {
         /// Names of the drones without a voltage in the calibration.
         in_calibration: Vec<String>,
     },
+    /// What drones measure depends on the levels of the laws that they measure with.
+    LawsOfOthers {
+        /// Number of drones.
+        drones: usize,
+        /// Correlation of their means with the levels.
+        correlation: f64,
+        /// Standard deviation of the levels, m/s.
+        spread_mps: f64,
+    },
     /// The map inverts the laws of the tables.
     PlainMap,
     /// The drones moved, so that the map is of their tracks.
@@ -225,6 +234,13 @@ impl fmt::Display for Warning {
             Self::Battery { uncorrected_mps, in_hover, in_calibration } => {
                 battery(f, *uncorrected_mps, in_hover.as_ref(), in_calibration)
             }
+            Self::LawsOfOthers { drones, correlation, spread_mps } => write!(
+                f,
+                "laws: what the {drones} drones measure follows the pulse widths that their laws start from \
+                 (correlation {correlation:+.2}). These seem to be the laws of other drones, or of these drones in \
+                 other slots. Each drone may be off by about {spread_mps:.1} m/s, which the stated errors do not \
+                 include. Use a calibration of these drones, and see which log is of which slot"
+            ),
             Self::PlainMap => f.write_str(
                 "errors: this map inverts the laws of the tables, as the paper does. Its standard errors \
                  are those of the hover's windows and of the law's parameters: what slow air during the \

@@ -1,5 +1,6 @@
 //! The journal of a fleet, read back: what happened, when, and to whom.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -9,6 +10,7 @@ use super::watch::Event;
 use crate::base::file::{FileError, read_whole};
 use crate::base::parse;
 use crate::link::id::DroneId;
+use crate::protocol::show::Stage;
 
 /// A journal is no longer than this, bytes: that of a thousand drones has about 150 a line, and some dozens of lines a
 /// drone and flight.
@@ -77,6 +79,37 @@ struct Outcome {
     outcome: String,
 }
 
+/// Drones that were seen in the air.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SeenInTheAir {
+    /// Those that flew.
+    pub flew: BTreeSet<DroneId>,
+    /// Those that restarted there, and were not seen to fly on.
+    pub fell: BTreeSet<DroneId>,
+}
+
+/// Drones that were seen in the air since a time, by the stages of the show that they told.
+pub fn seen_in_the_air(entries: &[Recorded], since_unix_us: u64) -> SeenInTheAir {
+    let mut seen = SeenInTheAir::default();
+    for entry in entries.iter().filter(|entry| entry.unix_us >= since_unix_us) {
+        let (Some(drone), Happened::Event(event)) = (entry.drone, &entry.happened) else {
+            continue;
+        };
+        match event {
+            Event::Stage { number, .. } if Stage::from_number(*number).is_flying() => {
+                seen.flew.insert(drone);
+                seen.fell.remove(&drone);
+            }
+            Event::Restarted { in_the_air: true } => {
+                seen.flew.insert(drone);
+                seen.fell.insert(drone);
+            }
+            _ => {}
+        }
+    }
+    seen
+}
+
 /// Entries of a folder's journal, in the order of their lines; none where there is no journal. Lines that are not whole
 /// (a station that lost its power) and those of other versions are left out.
 ///
@@ -117,6 +150,31 @@ mod tests {
 
     use super::super::journal::{Entry, Journal};
     use super::*;
+
+    #[test]
+    fn who_was_in_the_air_is_known_from_the_stages_since_the_start() {
+        let drone = |system: u8| DroneId { network: 0, system };
+        let at = |unix_us: u64, system: u8, event: Event| Recorded {
+            unix_us,
+            drone: Some(drone(system)),
+            happened: Happened::Event(event),
+        };
+        let stage = |number: u8| Event::Stage { number, stage: String::new() };
+        let entries = [
+            at(10, 1, stage(4)),
+            at(30, 2, stage(3)),
+            at(31, 3, stage(2)),
+            at(32, 4, stage(4)),
+            at(33, 5, stage(4)),
+            at(40, 4, Event::Restarted { in_the_air: true }),
+            at(41, 5, Event::Restarted { in_the_air: true }),
+            at(42, 5, stage(5)),
+            at(43, 2, stage(8)),
+        ];
+        let seen = seen_in_the_air(&entries, 20);
+        assert_eq!(seen.flew, BTreeSet::from([drone(2), drone(4), drone(5)]));
+        assert_eq!(seen.fell, BTreeSet::from([drone(4)]));
+    }
 
     #[test]
     fn it_is_read_as_it_was_written() {

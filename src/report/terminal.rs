@@ -15,6 +15,7 @@ use super::figures::air::mean_truth;
 use super::fleet_air::fleet_air;
 use super::headline::{bent_cells, bent_line, held, held_cell, held_words};
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
+use super::opening::laws_sentence;
 use super::page::capitalised;
 use super::posterior;
 use super::statistics_lines::statistics_lines;
@@ -42,6 +43,9 @@ pub fn terminal_summary(analysis: &Analysis, width: usize, color: bool) -> Strin
     let title = clean(&analysis.title);
     out.line(BOLD, if title.is_empty() { "Analysis" } else { &title });
     out.line(DIM, &format!("made by {}", clean(&analysis.made_by)));
+    if let Some(from) = &analysis.laws_from {
+        out.wrapped(DIM, "", &laws_sentence(from));
+    }
     if analysis.flights.is_empty() {
         out.line("", "");
         out.line(YELLOW, "There is no flight in this analysis.");

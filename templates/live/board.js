@@ -95,9 +95,10 @@ function sortRows() {
 const HEARD_MS = 10000;
 
 function drawBoardSum() {
-  const count = { good: 0, notice: 0, warning: 0, alarm: 0 };
-  for (const drone of state.drones) count[drone.level] += 1;
-  const parts = [["alarm", "alarm"], ["warning", "in trouble"], ["notice", "to look at"], ["good", "good"]]
+  const count = { good: 0, notice: 0, warning: 0, alarm: 0, landed: 0 };
+  const kind = (drone) => (drone.level === "good" && drone.stage === "landed" ? "landed" : drone.level);
+  for (const drone of state.drones) count[kind(drone)] += 1;
+  const parts = [["alarm", "alarm"], ["warning", "in trouble"], ["notice", "to look at"], ["good", "good"], ["landed", "landed"]]
     .filter(([level]) => count[level]).map(([level, word]) => `${count[level]} ${word}`);
   setText(byId("board-sum"), parts.join(", ") || "no drone yet");
   const since = Date.now() + state.ahead_ms - HEARD_MS;

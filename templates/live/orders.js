@@ -21,11 +21,15 @@ function chosenDrones() {
 
 function drawScope() {
   const chosen = chosenDrones();
-  const may = Boolean(state.facts?.may_order) && !state.facts?.is_replay;
+  const isOperator = Boolean(state.facts?.may_order) && !state.facts?.is_replay;
+  /* Nobody carries out an order any more. A lost link may come back while somebody aims at the button. */
+  const isOver = document.body.dataset.connection === "ended" || state.frame?.step === "over";
+  const may = isOperator && !isOver;
   byId("orders").hidden = Boolean(state.facts?.is_replay);
   for (const id of ["order-return", "order-land"]) byId(id).disabled = !may;
   const whom = chosen.length ? `for ${chosen.length} chosen ${chosen.length === 1 ? "drone" : "drones"}` : "for all drones";
-  setText(byId("order-scope"), may ? whom : "This page may look only: --live-orders prints the operator’s address");
+  setText(byId("order-scope"), may ? whom : isOperator ? "The station’s work is done: it sends no orders"
+    : "This page may look only: --live-orders prints the operator’s address");
   byId("choose-none").hidden = !chosen.length;
 }
 
@@ -34,8 +38,11 @@ function openConfirm(action) {
   const whom = drones.length ? `${drones.length === 1 ? "drone" : "drones"} ${drones.join(", ")}` : "all drones that are heard";
   pending = { wish: "order", action };
   if (drones.length) pending.drones = drones;
-  const does = action === "return" ? "fly back to where they took off, and land there" : "land where they are now";
-  setText(byId("confirm-text"), `Shall ${whom} leave the show and ${does}? Those on the ground will not start.`);
+  const one = drones.length === 1;
+  const does = action === "return" ? `fly back to where ${one ? "it" : "they"} took off, and land there`
+    : `land where ${one ? "it is" : "they are"} now`;
+  const rest = one ? "On the ground, it will not start." : "Those on the ground will not start.";
+  setText(byId("confirm-text"), `Shall ${whom} leave the show and ${does}? ${rest}`);
   setText(byId("confirm-yes"), action === "return" ? "Yes, return" : "Yes, land");
   byId("confirm").hidden = false;
   byId("confirm-no").focus();

@@ -92,9 +92,10 @@ function open() {
   stream.addEventListener("links", (event) => takeLinks(JSON.parse(event.data)));
   stream.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
   stream.addEventListener("over", () => { over = true; });
-  stream.onopen = () => { over = false; connection("open", "connected"); gone(""); };
+  stream.onopen = () => { over = false; connection("open", "connected"); gone(""); drawScope(); };
   stream.onerror = () => {
-    connection("lost", over ? "station ended" : "lost");
+    connection(over ? "ended" : "lost", over ? "station ended" : "lost");
+    drawScope();
     gone(over ? "The station has ended. The page goes on when it is started again."
       : "No word from the station: what is shown is old. Trying again.");
     if (stream.readyState === EventSource.CLOSED) setTimeout(open, 1500);

@@ -22,6 +22,8 @@ const TEXT: usize = 250;
 const RESTARTED_MS: u32 = 10_000;
 /// Positions that the link's quality is taken from.
 const BEATS: usize = 20;
+/// Gaps between positions that agree are a rate.
+const RATE_GAPS: usize = 4;
 
 /// Version of a vehicle's firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -188,10 +190,8 @@ impl Drone {
         if gaps.len() < 5 {
             return None;
         }
-        // The usual gap is the smallest; a repeated or reordered one is not in the list.
-        let usual = gaps.iter().copied().min().unwrap_or(0).max(1);
         let span: u64 = gaps.iter().copied().map(u64::from).sum();
-        let sent = (span as f64 / f64::from(usual)).round().max(1.0);
+        let sent = (span as f64 / f64::from(usual_gap(&gaps))).round().max(1.0);
         Some((gaps.len() as f64 / sent).min(1.0))
     }
 
@@ -306,6 +306,14 @@ impl Drone {
         if self.beats.len() > BEATS {
             self.beats.pop_front();
         }
+        let gaps: Vec<u32> = self.beats.iter().zip(self.beats.iter().skip(1)).map(gap).collect();
+        let Some((before, newest)) = gaps.split_at_checked(gaps.len().saturating_sub(RATE_GAPS))
+        else {
+            return;
+        };
+        if !before.is_empty() && is_other_rate(before, newest) {
+            self.beats.drain(..before.len());
+        }
     }
 
     fn text(&mut self, now: Micros, text: &dialect::STATUSTEXT_DATA) {
@@ -332,6 +340,25 @@ impl Drone {
 /// A signal of 0 to 254, in %.
 fn strength(rssi: u8) -> u8 {
     (f64::from(rssi) / 2.54).round() as u8
+}
+
+/// The gap at which nothing is missing: a small one, but none that is alone, as the first ones of a higher rate are.
+fn usual_gap(gaps: &[u32]) -> u32 {
+    let mut sorted = gaps.to_vec();
+    sorted.sort_unstable();
+    let rank = (gaps.len() / 3).clamp(1, RATE_GAPS);
+    sorted.get(rank - 1).copied().unwrap_or(0).max(1)
+}
+
+/// Whether the newest gaps are those of a rate that was asked for anew, and not of a link that loses: these differ
+/// from each other.
+fn is_other_rate(before: &[u32], newest: &[u32]) -> bool {
+    let (Some(&least), Some(&most)) = (newest.iter().min(), newest.iter().max()) else {
+        return false;
+    };
+    let usual = f64::from(usual_gap(before));
+    let agree = f64::from(most) <= 1.15 * f64::from(least);
+    agree && (f64::from(least) > 1.3 * usual || f64::from(most) < usual / 1.3)
 }
 
 fn gap((earlier, later): (&u32, &u32)) -> u32 {
@@ -439,6 +466,27 @@ mod tests {
         }
         let quality = drone.link_quality().unwrap();
         assert!((quality - 0.75).abs() < 0.05, "{quality}");
+    }
+
+    #[test]
+    fn another_rate_of_positions_is_no_loss() {
+        let mut drone = Drone::default();
+        let mut at_ms = 0;
+        // As stations ask: slowly on the ground, fast in the air, slowly for the logs.
+        for (gap_ms, count) in [(1000, 30), (400, 30), (200, 30), (1000, 30)] {
+            for number in 0..count {
+                at_ms += gap_ms;
+                let beat =
+                    dialect::GLOBAL_POSITION_INT_DATA { time_boot_ms: at_ms, ..Default::default() };
+                drone.on_message(u64::from(at_ms), &MavMessage::GLOBAL_POSITION_INT(beat));
+                // The first few of a slower rate are like those of a link that loses.
+                if number >= 4
+                    && let Some(quality) = drone.link_quality()
+                {
+                    assert!(quality > 0.95, "{quality} at {at_ms} ms");
+                }
+            }
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::compare::{no_measurement, nothing};
 use super::page::capitalised;
 use super::text::{clean, count};
 use air::{air_sentences, law_sentences};
-pub(super) use place::{When, day_and_time, named_site, when};
+pub(super) use place::{When, day_and_time, laws_sentence, named_site, when};
 use trust::distrust;
 
 /// More flights than this are summed up.

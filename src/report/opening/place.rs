@@ -1,12 +1,12 @@
 //! Where and when it was, how many drones flew, and for how long.
 
-use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis, FlightSite};
+use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis, FlightSite, LawsFrom};
 use crate::base::calendar::date;
 use crate::base::time::GpsTime;
 use crate::mission::plan::Purpose;
 use crate::numeric::{extent, upper_median};
 use crate::report::page::capitalised;
-use crate::report::text::{clean, count, fixed, purpose, usable};
+use crate::report::text::{clean, count, fixed, purpose, shortened, usable};
 
 use super::SUMMED_FLIGHTS;
 
@@ -14,6 +14,8 @@ use super::SUMMED_FLIGHTS;
 const SAME_PLACE_DEG: f64 = 0.001;
 /// Nobody measures the air lower than this, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
+/// Longest path that is shown whole, characters.
+const LONGEST_PATH: usize = 60;
 /// Heights closer than this are one height, m.
 const SAME_HEIGHT_M: f64 = 3.0;
 
@@ -90,6 +92,7 @@ pub(super) fn circumstances(analysis: &Analysis) -> Vec<String> {
     if flights.len() <= SUMMED_FLIGHTS {
         said.extend(flights.iter().map(flight_sentence));
     }
+    said.extend(analysis.laws_from.as_ref().map(laws_sentence));
     if flights.iter().any(|flight| flight.simulated) {
         said.push(
             if flights.iter().all(|flight| flight.simulated) {
@@ -102,6 +105,19 @@ pub(super) fn circumstances(analysis: &Analysis) -> Vec<String> {
         );
     }
     said
+}
+
+/// `The laws that measure are held from an earlier calibration of 16 drones, 2026-06-01 12:00 UTC (still/analysis.json).`
+pub(in crate::report) fn laws_sentence(from: &LawsFrom) -> String {
+    let when = from.start.map_or_else(String::new, |start| {
+        let (day, time) = day_and_time(start.to_unix_ms().div_euclid(1000));
+        format!(", {day} {} UTC", time.get(..5).unwrap_or(&time))
+    });
+    let drones = count(from.drones, "drone");
+    format!(
+        "The laws that measure are held from an earlier calibration of {drones}{when} ({}).",
+        shortened(&clean(&from.path), LONGEST_PATH)
+    )
 }
 
 /// `Two simulated flights of 16 drones`

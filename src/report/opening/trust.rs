@@ -123,7 +123,7 @@ fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
 fn doubt(warning: &Warning) -> Doubt {
     let own = || sentence(&warning.to_string());
     match warning {
-        Warning::WhoseLogs(_) | Warning::Failed(_) => (0, own()),
+        Warning::WhoseLogs(_) | Warning::Failed(_) | Warning::LawsOfOthers { .. } => (0, own()),
         Warning::NoLaw | Warning::NoFlock(_) | Warning::NoCalibration | Warning::NoLadder { .. } => (1, own()),
         Warning::FewWindows { .. } | Warning::FleetLadder { .. } | Warning::OtherStart { .. } => (2, own()),
         Warning::Wind { corrected, error_mps, .. } => (

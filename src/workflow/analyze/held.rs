@@ -6,19 +6,45 @@
 
 use std::path::Path;
 
-use crate::analysis::result::FlightAnalysis;
+use crate::analysis::result::{Analysis, FlightAnalysis, LawsFrom};
 use crate::base::plain::Shown as _;
+use crate::base::time::GpsTime;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
+use crate::numeric::upper_median;
+use crate::workflow::analysis_file::AnalysisFile;
+use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work};
 
 /// Homes of one slot further apart are of two grids, m.
 const SAME_HOME_M: f64 = 0.5;
 /// Grounds whose heights differ by more have other air: 1 % of its density, m.
 const SAME_GROUND_M: f64 = 100.0;
+
+/// The calibration whose laws are held, and where it is from.
+///
+/// # Errors
+///
+/// If the analysis cannot be read, or has no calibration.
+pub(super) fn read(path: &Path) -> Result<(FlightAnalysis, LawsFrom), WorkflowError> {
+    let AnalysisFile { path: file, sha256, analysis } = AnalysisFile::read(path)?;
+    let Analysis { title, flights, .. } = analysis;
+    let calibration = flights
+        .into_iter()
+        .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
+        .ok_or_else(|| {
+            WorkflowError::Usage(format!("{} has no calibration to hold", path.shown()))
+        })?;
+    let starts = calibration.drones.iter().filter_map(|drone| drone.clock.start);
+    let start = upper_median(starts.map(|start| start.total_ms() as f64).collect())
+        .and_then(|ms| GpsTime::from_total_ms(ms as i64));
+    let drones = calibration.drones.iter().filter(|drone| drone.laws.is_some()).count();
+    let path = file.shown().to_string();
+    Ok((calibration, LawsFrom { path, sha256, title, drones, start }))
+}
 
 /// What speaks against the laws of `reference`, read from `path`: one sentence, or nothing.
 pub(super) fn doubts(
@@ -46,7 +72,7 @@ pub(super) fn doubts(
     reasons.dedup();
     (!reasons.is_empty()).then(|| {
         format!(
-            "{}: the laws seem to be those of other drones: {}. Each drone has its own law; with \
+            "the laws of {} seem to be those of other drones: {}. Each drone has its own law; with \
              another fleet's laws the map is wrong by as much as the fleets differ, which the \
              stated errors do not include. Use the laws of a calibration of these drones",
             path.shown(),

@@ -15,7 +15,6 @@ use std::path::{Path, PathBuf};
 use self::fields::{read_study, write_fields};
 pub use self::gather::{Request, gather, load_plan};
 pub use self::settings::{Files, Settings, Uncorrected};
-use super::analysis_file::AnalysisFile;
 use super::ending::Ending;
 use super::error::WorkflowError;
 use super::find::{Found, Work, find, lean_tables};
@@ -27,7 +26,7 @@ use super::provenance::provenance;
 use crate::analysis::battery::Sag;
 use crate::analysis::combine;
 use crate::analysis::lean_table::LeanTable;
-use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
+use crate::analysis::result::{Analysis, FlightAnalysis, LawsFrom, Yield};
 use crate::analysis::{AnalysisOptions, FlightInput, Warning, analyze};
 use crate::base::file::write_with;
 use crate::base::json::write_json;
@@ -66,8 +65,8 @@ pub struct Analysing<'a> {
     host: &'a dyn Host,
     work: &'a Work,
     settings: &'a Settings,
-    /// The calibration whose A and u0 are held.
-    reference: Option<FlightAnalysis>,
+    /// The calibration whose A and u0 are held, and where it is from.
+    reference: Option<(FlightAnalysis, LawsFrom)>,
     doubts: Option<String>,
 }
 
@@ -94,14 +93,14 @@ impl<'a> Analysing<'a> {
         for used in &work.used {
             host.say(used);
         }
-        let reference = hold.map(read_reference).transpose()?;
+        let reference = hold.map(held::read).transpose()?;
         for note in work.flights.iter().flat_map(|flight| &flight.notes) {
             host.warn(note);
         }
         let indicator = settings.options.indicator;
         let doubts = hold
             .zip(reference.as_ref())
-            .and_then(|(path, reference)| held::doubts(path, reference, indicator, work));
+            .and_then(|(path, (reference, _))| held::doubts(path, reference, indicator, work));
         Ok(Self { host, work, settings, reference, doubts })
     }
 
@@ -117,8 +116,13 @@ impl<'a> Analysing<'a> {
     /// If nothing can be analysed, or the work is stopped.
     pub fn run(self, provenance: bool) -> Result<Analysed, WorkflowError> {
         let Self { host, work, settings, reference, doubts } = self;
+        let (reference, laws_from) = reference.unzip();
         let tables = lean_tables(work, settings.options.indicator);
-        let inputs = inputs(work, &tables, settings.without);
+        let mut inputs = inputs(work, &tables, settings.without);
+        if reference.is_some() {
+            drop_unflown_calibrations(&mut inputs);
+        }
+        let wanted = inputs.len();
         let logs: usize = inputs.iter().map(|input| input.logs.len()).sum();
         let progress = host.progress("analysing", logs as u64);
         // Hashing fills the pauses in which the analysis keeps one processor busy.
@@ -136,12 +140,13 @@ impl<'a> Analysing<'a> {
             analysis = with_others(host, work, settings, reference.as_ref(), analysis);
         }
         progress.finish();
+        analysis.laws_from = laws_from;
         analysis.warnings.extend(work.absent.iter().cloned().map(Warning::Failed));
         analysis
             .warnings
             .extend(doubts.into_iter().chain(file_doubts(work)).map(Warning::WhoseLogs));
         host.check_stop()?;
-        let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
+        let some_absent = !work.absent.is_empty() || analysis.flights.len() < wanted;
         Ok(Analysed {
             analysis,
             logs,
@@ -151,6 +156,16 @@ impl<'a> Analysing<'a> {
             basemap: None,
             files: settings.files.clone(),
         })
+    }
+}
+
+/// Leaves out calibrations that were not flown: with laws of an earlier one, nobody misses them.
+fn drop_unflown_calibrations(inputs: &mut Vec<FlightInput<'_>>) {
+    let is_unflown = |input: &FlightInput<'_>| {
+        input.purpose == Some(Purpose::Calibration) && input.logs.is_empty()
+    };
+    if !inputs.iter().all(is_unflown) {
+        inputs.retain(|input| !is_unflown(input));
     }
 }
 
@@ -367,14 +382,4 @@ fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<PathBuf, Workflow
     // Streamed: that of a thousand drones has a hundred megabytes.
     write_with(&path, |out| write_json(out, analysis))?;
     Ok(path)
-}
-
-/// The calibration whose A and u0 are held.
-fn read_reference(path: &Path) -> Result<FlightAnalysis, WorkflowError> {
-    let AnalysisFile { analysis, .. } = AnalysisFile::read(path)?;
-    analysis
-        .flights
-        .into_iter()
-        .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
-        .ok_or_else(|| WorkflowError::Usage(format!("{} has no calibration to hold", path.shown())))
 }

@@ -261,9 +261,20 @@ fn look_again(
     // The station's own work has the other processors.
     let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return };
     let settings = Settings::default();
+    let mut has_told = false;
     while !shared.is_over() {
         let (step, show_s) = station.moment();
         let flown = show_s.filter(|_| step == Step::Flying);
+        if !has_told && flown.is_some_and(|show_s| show_s > ends_s) {
+            has_told = true;
+            let note = "Telemetry told no air: there was too little of it, or no drone was left in the hover. The logs may \
+                        have more."
+                .to_owned();
+            station.air(
+                Some(AirView { provisional: true, note, ..AirView::default() }),
+                BTreeMap::new(),
+            );
+        }
         let Some(show_s) = flown.filter(|show_s| (begins_s + FIRST_S..=ends_s).contains(show_s))
         else {
             shared.wait(Duration::from_secs(1));
@@ -299,6 +310,7 @@ fn look_again(
                 let look = Look { time_s: view.time_s, of: of.clone() };
                 shared.looks.lock().unwrap_or_else(PoisonError::into_inner).push(look);
                 station.air(Some(view), of);
+                has_told = true;
             }
         }
         let took = clock.now().saturating_sub(begun);

@@ -71,6 +71,7 @@ fn in_terminal(flight: &FlightAnalysis) -> String {
         made_by: String::new(),
         title: String::new(),
         flights: vec![flight.clone()],
+        laws_from: None,
         warnings: Vec::new(),
     };
     terminal_summary(&analysis, 200, false)

@@ -89,11 +89,30 @@ fn laws_of_other_drones_are_used_with_a_warning() {
     let told: Vec<&str> = held.out.split_whitespace().collect();
     let told = told.join(" ").replace(folder, "");
     let start =
-        told.find("campaign/analysis.json: the laws seem").unwrap_or_else(|| panic!("{held}"));
+        told.find("the laws of campaign/analysis.json seem").unwrap_or_else(|| panic!("{held}"));
     let end = told[start..].find("calibration of these drones").unwrap();
     assert_snapshot!(told[start..start + end]);
     let own = analyze(bench, 0, &["campaign", "--hold", "campaign/analysis.json"]);
-    assert!(!own.out.contains("the laws seem"), "{own}");
+    assert!(!own.out.contains("seem to be those of other drones"), "{own}");
+}
+
+#[test]
+fn a_hover_alone_is_whole_with_the_laws_of_an_earlier_day() {
+    let bench = flown();
+    let today = Bench::new();
+    fly(&today, "today", &[]);
+    fs::remove_dir_all(today.path("today/calibration/simulated")).unwrap();
+    let laws = bench.path("campaign/analysis.json");
+    let alone = analyze(&today, 3, &["today"]);
+    assert!(alone.out.contains("calibration: no logs to analyse"), "{alone}");
+    let held = analyze(&today, 0, &["today", "--hold", laws.to_str().unwrap()]);
+    assert!(!held.out.contains("no logs to analyse"), "{held}");
+    let told: Vec<&str> = held.out.split_whitespace().collect();
+    let sentence = "The laws that measure are held from an earlier calibration of 1 drone, 2026-06-01 12:00 UTC";
+    assert!(told.join(" ").contains(sentence), "{held}");
+    let json = analyze(&today, 0, &["today", "--hold", laws.to_str().unwrap(), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(told["analysis"]["laws_from"]["drones"], 1, "{json}");
 }
 
 #[test]

@@ -109,6 +109,7 @@ fn the_report_says_what_the_study_says() {
         made_by: String::new(),
         title: String::new(),
         flights: Vec::new(),
+        laws_from: None,
         warnings: Vec::new(),
     };
     let whole = render_with_study(&analysis, &study, &Provenance::default()).unwrap();

@@ -42,13 +42,7 @@ pub(crate) fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> V
 /// Waits for all, tells them where and when, and waits until all have landed; the start's second.
 ///
 /// Between the order and the start lie `ahead_s` seconds of the fleet's time.
-fn lead(
-    station: &mut Station,
-    running: &Running,
-    field: &Field,
-    count: u8,
-    ahead_s: i64,
-) -> i64 {
+fn lead(station: &mut Station, running: &Running, field: &Field, count: u8, ahead_s: i64) -> i64 {
     let ids: Vec<DroneId> = (1..=count).map(|system| DroneId { network: 0, system }).collect();
     let mut known = 0;
     for round in 0.. {

@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Crew;
 use super::hear::hear_together;
+use crate::base::causes::with_causes;
 use crate::base::time::{GpsTime, WEEK_S};
 use crate::campaign::start::StartRecord;
 use crate::fleet::gate::State;
 use crate::fleet::messages::start_packet;
+use crate::fleet::recorded::{read as read_journal, seen_in_the_air};
 use crate::fleet::slots::FleetTable;
 use crate::fleet::start::Start;
 use crate::link::clock::{MS, Micros, S};
@@ -155,9 +157,31 @@ impl Crew<'_> {
                  are watched, but not compared with their trajectories",
             ),
         }
+        self.remember(start)?;
         let text = start.map(|start| format!("start at {}", start.tow_ms / 1000));
         self.note("attached", text)?;
         Ok(Found::Flight(Start::attached(self.drones(), start)))
+    }
+
+    /// Who was in the air before this station came, by the journal of the one before it.
+    fn remember(&mut self, start: Option<GpsTime>) -> Result<(), WorkflowError> {
+        let record = StartRecord::read(self.folder)?;
+        let Some(record) = record.filter(|record| Some(record.start) == start) else {
+            return Ok(());
+        };
+        match read_journal(&self.folder.0) {
+            Ok(entries) => {
+                let since_unix_us = record.authorized_unix_s.saturating_mul(1_000_000);
+                let seen = seen_in_the_air(&entries, since_unix_us);
+                self.flew.extend(seen.flew);
+                self.fell.extend(seen.fell);
+            }
+            Err(error) => self.host.warn(&format!(
+                "{}; drones that have landed already are told to be on the ground",
+                with_causes(&error, ": ")
+            )),
+        }
+        Ok(())
     }
 
     /// The start that was written down, if it has passed and all its drones are down.

@@ -69,6 +69,7 @@ pub(crate) fn campaign() -> Analysis {
         made_by: "updraft 0.1.0".to_owned(),
         title: "Pixel fleet, 49 drones over a synthetic thermal".to_owned(),
         flights: vec![calibration, hover()],
+        laws_from: None,
         warnings: vec![Warning::Said(
             "Slot 12: the clock was aligned with the plan only; its windows may be off by 0.2 s."
                 .to_owned(),
@@ -89,6 +90,7 @@ pub(crate) fn updraft_series() -> Analysis {
         made_by: "updraft 0.1.0".to_owned(),
         title: "One drone in eleven updrafts".to_owned(),
         flights,
+        laws_from: None,
         warnings: Vec::new(),
     }
 }
