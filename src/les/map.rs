@@ -60,7 +60,7 @@ impl LesMap {
     /// # Errors
     /// A sentence that says which key is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
-        let map: Self = parse::toml(text).map_err(|error| error.to_string())?;
+        let map: Self = parse::toml(text).map_err(|error| parse::toml_trouble(text, &error))?;
         if map.schema != MAP_SCHEMA {
             return Err(format!("this program reads \"{MAP_SCHEMA}\", not \"{}\"", map.schema));
         }

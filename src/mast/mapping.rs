@@ -62,7 +62,8 @@ impl MastMapping {
         let wrong = |reason: String| MastError::Mapping { path: path.to_owned(), reason };
         let bytes = read_whole(path, MAX_BYTES)?;
         let text = std::str::from_utf8(&bytes).map_err(|error| wrong(error.to_string()))?;
-        let mut mapping: Self = parse::toml(text).map_err(|error| wrong(error.to_string()))?;
+        let mut mapping: Self =
+            parse::toml(text).map_err(|error| wrong(parse::toml_trouble(text, &error)))?;
         mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
         // Times that are of no known zone could be anywhere: those of masts are UTC unless it is said otherwise.
         mapping.time.utc_offset_h.get_or_insert(0.0);

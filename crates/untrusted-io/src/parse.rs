@@ -49,6 +49,16 @@ pub fn toml<T: DeserializeOwned>(text: &str) -> Result<T, toml::de::Error> {
     T::deserialize(Plain(toml::Deserializer::parse(text)?))
 }
 
+/// Words of an error of [`toml()`] with its line, except where it is of the whole text: what is missing has no line.
+pub fn toml_trouble(text: &str, error: &toml::de::Error) -> String {
+    match error.span() {
+        Some(span) if span.start > 0 || span.end < text.trim_end().len() => {
+            error.to_string().trim_end().to_owned()
+        }
+        _ => error.message().to_owned(),
+    }
+}
+
 /// Passes everything on, texts as [`plain`] ones.
 struct Plain<T>(T);
 
@@ -342,5 +352,14 @@ mod tests {
         assert!(error.message().starts_with("unknown field `wrong␊key`"), "{error}");
         assert_eq!(error.span(), Some(12..24));
         assert!(json::<u8>(b"1 2").is_err(), "one value");
+    }
+
+    #[test]
+    fn what_is_missing_has_no_line() {
+        let told = |text: &str| toml_trouble(text, &toml::<Document>(text).unwrap_err());
+        assert_eq!(told("# a remark\ntagged = []\nouter = []\n[pairs]\n"), "missing field `title`");
+        assert_eq!(told(""), "missing field `title`");
+        let wrong = told("wrong = 1\ntagged = []\n");
+        assert!(wrong.contains("line 1") && wrong.contains("unknown field `wrong`"), "{wrong}");
     }
 }

@@ -154,7 +154,8 @@ impl Mapping {
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, TableError> {
         let wrong = |reason: String| TableError::Mapping { path: path.to_owned(), reason };
         let text = std::str::from_utf8(bytes).map_err(|error| wrong(error.to_string()))?;
-        let mut mapping: Self = parse::toml(text).map_err(|error| wrong(error.to_string()))?;
+        let mut mapping: Self =
+            parse::toml(text).map_err(|error| wrong(parse::toml_trouble(text, &error)))?;
         mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for file in mapping.flights.iter_mut().flat_map(|flight| &mut flight.files) {
