@@ -5,6 +5,7 @@ use super::beside::Beside;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
 use super::corrections::Corrections;
+use super::held_hover;
 use super::hover::Hover;
 use super::input::{AtHand, FlightInput, LogInput, TruthSeries};
 use super::law::{LawKind, LawOf};
@@ -124,10 +125,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let of_air = match slot {
+    let mut of_air = match slot {
         Some((_, segments)) if log.table.is_none() => windows::of_air(segments),
         _ => targets.clone(),
     };
+    let truth = true_air(flight, &of_air);
+    let left = held_hover::end_where_left(flight, &mut of_air);
     let seen = Seen { flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
     let updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
@@ -138,6 +141,14 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         }
         (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
     };
+    let updraft = updraft.map(|found| {
+        found.map(|(mut series, law)| {
+            if let Some(measured) = &mut series.measured {
+                measured.quality.extend(left);
+            }
+            (series, law)
+        })
+    });
     let source = input.shown(&log.path);
     let drone = DroneAnalysis {
         slot: number,
@@ -163,7 +174,6 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     if let Some(Ok((series, _))) = &updraft {
         hover.records = Records::of(shared, flight, series, (number, &drone.name));
     }
-    let truth = true_air(flight, &of_air);
     let first_fix_deg = flight.first_fix_deg;
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, first_fix_deg, truth })
 }

@@ -20,8 +20,6 @@ const ALIGNED_S: f64 = 0.5;
 const DRIFT_US_PER_MIN: f64 = 10.0;
 /// Shortest hover whose drift is stated, s. Chosen.
 const DRIFT_S: f64 = 60.0;
-/// Who is lower than this below its hover has come down, m.
-const CAME_DOWN_M: f64 = 3.0;
 /// Longest hover, s.
 const LONGEST_S: i64 = 200_000;
 
@@ -84,7 +82,6 @@ impl Hover {
         let (low, high) = flight.pulse_limits_us;
         let mut hover = Self { start_s, end_s, first_s, ..Self::default() };
         let mut bad: Vec<Option<Quality>> = Vec::new();
-        let mut heights_m: Vec<f64> = Vec::new();
         for second in first_s..=last_s {
             let time_s = second as f64;
             let (from, to) = (time_s - half, time_s + half);
@@ -96,15 +93,13 @@ impl Hover {
                 let limit = options.follow_limit_mps;
                 (mean - target.commanded_mps).abs() > limit || sd > limit
             };
-            let height_m = mean_sd(flight.height_m.between(from, to)).0;
-            heights_m.push(height_m);
             let means = (|| {
                 Some(Second {
                     time_s,
                     pulse_us: pulse.mean(time_s)?,
                     velocity_mps: velocity.mean(time_s)?,
                     lean_deg: lean_deg(roll.mean(time_s)?, pitch.mean(time_s)?),
-                    height_m,
+                    height_m: mean_sd(flight.height_m.between(from, to)).0,
                 })
             })();
             let flag = match means {
@@ -117,13 +112,7 @@ impl Hover {
             bad.push(flag);
             hover.seconds.push(means.filter(|_| flag.is_none()));
         }
-        let down_from = came_down(&bad, &heights_m).filter(|_| target.commanded_mps == 0.0);
-        hover.flag_stretches(&bad[..down_from.unwrap_or(bad.len())]);
-        if let Some(from) = down_from {
-            let (start_s, end_s) = ((first_s + from as i64) as f64, last_s as f64);
-            let reason = format!("it came down early: no values from {start_s:.0} to {end_s:.0} s");
-            hover.quality.push(QualityFlag { flag: Quality::Incomplete, start_s, end_s, reason });
-        }
+        hover.flag_stretches(&bad);
         hover.flag_clock(flight);
         hover.look_closer(flight);
         hover
@@ -225,15 +214,6 @@ impl Hover {
     }
 }
 
-/// Index of the first second of a drone that comes down before its hover ends, and never goes on with it: ordered down,
-/// on its way home, or fallen.
-fn came_down(bad: &[Option<Quality>], heights_m: &[f64]) -> Option<usize> {
-    let last_good = bad.iter().rposition(Option::is_none)?;
-    let behind = heights_m.get(last_good + 1..)?;
-    let lowest_m = behind.iter().copied().filter(|height_m| height_m.is_finite()).reduce(f64::min);
-    (heights_m[last_good] - lowest_m? > CAME_DOWN_M).then_some(last_good + 1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,19 +265,6 @@ mod tests {
         flight.velocity_up_mps.value = moving.map(|moves| f64::from(u8::from(moves))).collect();
         let hover = look(&flight, 199.0);
         assert_eq!(flags(&hover), [(Quality::Manoeuvre, 76.0, 88.0)]);
-    }
-
-    #[test]
-    fn a_drone_that_comes_down_early_is_told_as_such() {
-        let mut flight = flown(|time| if time < 150.0 { 1540.0 } else { 1150.0 });
-        let down_m = |time: &f64| ((time - 130.0) * 5.0).clamp(0.0, 100.0);
-        let times = flight.height_m.time_s.clone();
-        flight.height_m.value = times.iter().map(|time| 100.0 - down_m(time)).collect();
-        let sinks = |time: &f64| if (130.0..150.0).contains(time) { -5.0 } else { 0.0 };
-        flight.velocity_up_mps.value = times.iter().map(sinks).collect();
-        let hover = look(&flight, 300.0);
-        assert_eq!(flags(&hover), [(Quality::Incomplete, 126.0, 295.0)]);
-        assert_eq!(hover.quality[0].reason, "it came down early: no values from 126 to 295 s");
     }
 
     #[test]

@@ -27,6 +27,7 @@ pub mod fit;
 mod fit_warning;
 mod fitted;
 mod headline;
+mod held_hover;
 mod hold;
 mod hover;
 mod input;

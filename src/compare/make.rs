@@ -17,6 +17,8 @@ use crate::numeric::median;
 
 /// Names that a sentence has at most.
 const MOST_NAMED: usize = 12;
+/// A line that may bend has a slope in hover that its ladder's mean slope is off by this share; see docs/products.md.
+const BENT_SHARE: f64 = 0.03;
 
 /// Error of a comparison: there is nothing to compare.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -107,20 +109,40 @@ pub fn compare(
     Ok(found)
 }
 
+/// Relative standard error of the slope of a calibration's line, that of a line that bends within its ladder included.
+fn slope_share(couple: &Couple<'_>) -> Option<f64> {
+    let line = couple.reference.flight.flock.as_ref()?.linear.as_ref()?;
+    let slope = line.parameters.first()?.estimate;
+    let share = slope.se / slope.value.abs();
+    share.is_finite().then(|| share.hypot(BENT_SHARE))
+}
+
 /// Everything of two campaigns.
 fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
     let calibration = |one: &&Couple<'_>| one.reference.flight.purpose == Purpose::Calibration;
     let (calibrations, measurements): (Vec<&Couple<'_>>, Vec<&Couple<'_>>) =
         couples.iter().partition(calibration);
-    let same_calibration =
-        !calibrations.is_empty() && calibrations.iter().all(|couple| couple.is_one_flight());
+    let sides = couples.first().map(|couple| [couple.reference.side, couple.other.side]);
+    let held = |side: &Side| side.analysis.laws_from.as_ref().map(|from| from.sha256.clone());
+    let same_laws = sides.is_none_or(|[reference, other]| held(reference) == held(other));
+    for side in sides.into_iter().flatten() {
+        if let Some(from) = &side.analysis.laws_from {
+            found.notes.push(format!(
+                "{}: its map is by laws that are held from another analysis ({})",
+                side.id, from.path
+            ));
+        }
+    }
+    let same_calibration = same_laws
+        && !calibrations.is_empty()
+        && calibrations.iter().all(|couple| couple.is_one_flight());
+    let slope_share =
+        calibrations.iter().filter_map(|couple| slope_share(couple)).fold(0.0, f64::max);
     let mut scatters = Vec::new();
     for couple in calibrations {
         let words = words_of(couple);
         if couple.is_one_flight() {
-            found.notes.push(format!(
-                "{words} are one flight: its laws are the same, and their errors cancel in the maps"
-            ));
+            found.notes.push(format!("{words} are one flight: its laws are the same"));
             continue;
         }
         match laws_of(couple, choice) {
@@ -138,7 +160,11 @@ fn pair_of(found: &mut Comparison, couples: &[Couple<'_>], choice: LawChoice) {
     }
     let scatter = scatters.into_iter().fold(1.0, f64::max);
     for couple in measurements {
-        measurement(found, couple, Calibrations { are_one: same_calibration, scatter });
+        measurement(
+            found,
+            couple,
+            Calibrations { are_one: same_calibration, slope_share, scatter },
+        );
     }
 }
 

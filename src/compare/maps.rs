@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 use super::chance::{chi2_above, holm, two_sided, two_sided_t};
 use super::result::{MapComparison, MeanComparison, PlaceChange, PlaceComparison, ScaleComparison};
 use super::side::Couple;
+use crate::analysis::LawKind;
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 use crate::analysis::statistics::result::{FieldStatistics, Interval, Scale};
 use crate::base::estimate::Estimate;
@@ -32,8 +33,10 @@ const MOST_PLACES: usize = 600;
 /// The calibrations that two maps rest on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Calibrations {
-    /// They are one, whose errors cancel.
+    /// They are one.
     pub(super) are_one: bool,
+    /// Relative standard error of their laws' slope, which makes any change too large or too small.
+    pub(super) slope_share: f64,
     /// Scatter of the drones' laws over their stated errors, by which those are widened here, too; 1 or more.
     pub(super) scatter: f64,
 }
@@ -44,6 +47,9 @@ pub(super) fn compare(
     [a, b]: [&UpdraftMap; 2],
     calibrations: Calibrations,
 ) -> Option<(MapComparison, Option<String>)> {
+    let bends = [a, b].iter().any(|map| map.law == LawKind::SignedQuadratic);
+    let is_shared = calibrations.are_one;
+    let calibrations = Calibrations { are_one: is_shared && !bends, ..calibrations };
     let mean = means(a, b, calibrations)?;
     let fleet = |map: &UpdraftMap| map.posterior.as_ref().and_then(|posterior| posterior.fleet);
     let posterior = fleet(a).zip(fleet(b)).filter(|_| !calibrations.are_one);
@@ -56,7 +62,8 @@ pub(super) fn compare(
         pair: couple.pair(),
         mean,
         posterior: posterior.map(|(a, b)| of_normals(a, b)),
-        same_calibration: calibrations.are_one,
+        same_calibration: is_shared,
+        errors_cancel: calibrations.are_one,
         places,
         scales: scales(flights, [a, b]),
     };
@@ -138,6 +145,7 @@ fn means(a: &UpdraftMap, b: &UpdraftMap, calibrations: Calibrations) -> Option<M
     let rest = rest.hypot(a.density - b.density);
     let [zero, half] =
         [0, 1].map(|of| if calibrations.are_one { 0.0 } else { a.zero[of].hypot(b.zero[of]) });
+    let rest = rest.hypot((b.value - a.value) * calibrations.slope_share);
     let change = Estimate::new(b.value - a.value, if is_known { zero.hypot(rest) } else { 0.0 });
     let half = half.hypot(NORMAL * rest);
     // The interval of a zero is wider than a normal one: its half width says what is beyond chance.

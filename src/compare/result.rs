@@ -233,8 +233,12 @@ pub struct MapComparison {
     /// The same of the posteriors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub posterior: Option<MeanComparison>,
-    /// Whether both maps rest on the same calibration, so that its errors cancel.
+    /// Whether both maps rest on the same calibration.
     pub same_calibration: bool,
+    /// Whether its errors cancel in the difference: those of a line's zero do, those of a law that is flat near hover
+    /// change what a drone makes of the air.
+    #[serde(default)]
+    pub errors_cancel: bool,
     /// Means by place; absent: the places differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<PlaceComparison>,

@@ -88,6 +88,17 @@ pub struct SeenInTheAir {
     pub fell: BTreeSet<DroneId>,
 }
 
+/// Drones that steps of these names were for, since a time.
+pub fn drones_of_steps(
+    entries: &[Recorded],
+    since_unix_us: u64,
+    names: &[&str],
+) -> BTreeSet<DroneId> {
+    let of_step = |entry: &&Recorded| matches!(&entry.happened, Happened::Step { step, .. } if names.contains(&step.as_str()));
+    let later = entries.iter().filter(|entry| entry.unix_us >= since_unix_us);
+    later.filter(of_step).filter_map(|entry| entry.drone).collect()
+}
+
 /// Drones that were seen in the air since a time, by the stages of the show that they told.
 pub fn seen_in_the_air(entries: &[Recorded], since_unix_us: u64) -> SeenInTheAir {
     let mut seen = SeenInTheAir::default();
@@ -174,6 +185,14 @@ mod tests {
         let seen = seen_in_the_air(&entries, 20);
         assert_eq!(seen.flew, BTreeSet::from([drone(2), drone(4), drone(5)]));
         assert_eq!(seen.fell, BTreeSet::from([drone(4)]));
+        let step = |unix_us: u64, step: &str| Recorded {
+            unix_us,
+            drone: Some(drone(9)),
+            happened: Happened::Step { step: step.to_owned(), text: String::new() },
+        };
+        let entries = [step(10, "abort"), step(30, "upload")];
+        assert_eq!(drones_of_steps(&entries, 20, &["abort"]), BTreeSet::new());
+        assert_eq!(drones_of_steps(&entries, 5, &["abort"]), BTreeSet::from([drone(9)]));
     }
 
     #[test]

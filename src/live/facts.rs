@@ -21,6 +21,8 @@ pub struct Facts {
     pub flight: String,
     /// Title for people.
     pub title: String,
+    /// Name of the site, as the plan has it; empty: it has none.
+    pub site: String,
     /// Length of the show, s.
     pub duration_s: f64,
     /// Latitude and longitude of the show's origin, degrees.
@@ -73,6 +75,7 @@ impl Facts {
         Self {
             flight: plan.name.clone(),
             title: plan.title.clone(),
+            site: plan.site_name.clone().unwrap_or_default(),
             duration_s: plan.duration_ms as f64 / 1000.0,
             origin_deg: [plan.site.origin_lat_deg, plan.site.origin_lon_deg],
             orientation_deg: plan.site.orientation_deg,

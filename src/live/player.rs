@@ -194,15 +194,25 @@ impl Track {
         last.map_or_else(String::new, |(_, words)| words.clone())
     }
 
+    fn stage_at(&self, time_s: f64) -> Option<Stage> {
+        let until = self.stages.partition_point(|(from_s, _)| *from_s <= time_s);
+        let last = until.checked_sub(1).and_then(|at| self.stages.get(at));
+        last.map(|(_, number)| Stage::from_number(*number))
+    }
+
     fn view(&self, planned: &Trajectory, time_s: f64) -> DroneView {
         let armed = self.armed_s.iter().any(|(from, to)| (*from..=*to).contains(&time_s));
-        let stage = self.stages.iter().take_while(|(from, _)| *from <= time_s).last();
-        let stage = stage.map_or_else(
-            || if armed { "armed".to_owned() } else { "on the ground".to_owned() },
-            |(_, number)| Stage::from_number(*number).to_string(),
-        );
+        let stage = match self.stage_at(time_s) {
+            // Out of the show mode, on its way home or down.
+            Some(Stage::Off) if armed => "not in the show".to_owned(),
+            Some(stage) => stage.to_string(),
+            None if armed => "armed".to_owned(),
+            None => "on the ground".to_owned(),
+        };
         let place_m = self.place(time_s);
-        let wanted = armed.then(|| {
+        let performs = self.stages.is_empty()
+            || self.stage_at(time_s).is_some_and(|stage| stage == Stage::Performing);
+        let wanted = (armed && performs).then(|| {
             let mut at = Cursor::new(planned).state_at(time_s).position_m;
             at.z -= planned.start_m.z;
             at

@@ -478,6 +478,13 @@ impl Station {
         let (Some(state), Some(drone)) = (state, drone) else { return view };
         view.stage = stage(state);
         view.armed = state.is_armed();
+        // The flight mode of one that was sent home says no more when it is there.
+        if view.armed == Some(false)
+            && flying.is_some_and(|of| of.flew && !of.fell)
+            && state.status.is_none_or(|(_, status)| status.stage == Stage::Off)
+        {
+            view.stage = Stage::Landed.to_string();
+        }
         view.heard_ms = Some(now_ms.saturating_sub(at.saturating_sub(state.heard) / 1000));
         view.loss_percent = state.link_quality().map(|share| (100.0 * (1.0 - share)).round());
         view.signal_percent = state.signal_percent();
@@ -487,8 +494,10 @@ impl Station {
             view.battery_v = health.battery_v.map(centi);
             view.battery_percent = health.battery_percent.map(f64::from);
         }
+        let is_heard = at.saturating_sub(state.heard) <= self.limits.silent;
         view.minutes_left = view
             .battery_percent
+            .filter(|_| is_heard)
             .and_then(|percent| now.minutes_left(drone, at, percent, self.limits.battery_percent));
         view.place_m = state.position.filter(|(_, at)| at.has_place()).map(|(_, at)| {
             let frame = self.plan.site.frame();

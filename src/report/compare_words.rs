@@ -280,8 +280,13 @@ pub(super) fn map_sentences(map: &MapComparison) -> Vec<String> {
     }
     if map.same_calibration {
         sentences.push(
-            "Both maps rest on the same calibration, whose errors cancel in their difference."
-                .to_owned(),
+            if map.errors_cancel {
+                "Both maps rest on the same calibration: the error of its zero cancels in their difference."
+            } else {
+                "Both maps rest on the same calibration by a law that is flat near hover: the error of its zero makes \
+                 them too weak or too strong, and does not cancel in their difference."
+            }
+            .to_owned(),
         );
     }
     if let Some(places) = &map.places {

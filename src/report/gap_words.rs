@@ -62,7 +62,7 @@ pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, Strin
 pub(super) fn map_words(map: &MapGain) -> String {
     let signed = |value: f64| format!("{}{}", if value < 0.0 { "" } else { "+" }, fixed(value, 2));
     format!(
-        "The map of the air of {} by the model, against the truth ({}, running means of 10 s): \
+        "The map of the air of {} by this model (the report's is by the calibration's laws, and has other errors), against the truth ({}, running means of 10 s): \
          rms error {} m/s before, {} m/s after (answering zero: {}); the part common to all \
          drones: {} before, {} after (the air that both flights shared makes ±{} likely); the \
          rest: {} and {}",

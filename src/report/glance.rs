@@ -91,8 +91,7 @@ fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
     let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
     let whose = if together.is_some() { ": each drone alone, averaged" } else { "" };
     let wider = if together.is_some_and(|fleet| fleet.se > WIDER * air.error.se) {
-        "; the wider interval of all drones together counts: it also weighs how much the air of the \
-         calibration may have moved its zero"
+        "; the wider interval counts: it has the calibration's air, too"
     } else {
         ""
     };

@@ -100,7 +100,8 @@ function drawBoardSum() {
   for (const drone of state.drones) count[kind(drone)] += 1;
   const parts = [["alarm", "alarm"], ["warning", "in trouble"], ["notice", "to look at"], ["good", "good"], ["landed", "landed"]]
     .filter(([level]) => count[level]).map(([level, word]) => `${count[level]} ${word}`);
-  setText(byId("board-sum"), parts.join(", ") || "no drone yet");
+  const isOld = ["lost", "ended"].includes(document.body.dataset.connection);
+  setText(byId("board-sum"), (parts.join(", ") || "no drone yet") + (isOld && parts.length ? ", when they were heard last" : ""));
   const since = Date.now() + state.ahead_ms - HEARD_MS;
   const heard = state.drones.filter((drone) => drone.heard_ms !== null && drone.heard_ms > since).length;
   const of = state.facts?.is_replay ? `${state.drones.length}` : `${heard} of ${state.drones.length}`;

@@ -277,13 +277,13 @@ function drawAir() {
   setText(byId("air-fleet"), air.fleet_mps
     ? `Mean of the fleet ${signed(air.fleet_mps[0], 2)} m/s (95 %: ${signed(air.fleet_mps[1], 2)} to ${signed(air.fleet_mps[2], 2)})`
     : "No mean of the fleet yet");
-  setText(byId("air-note"), `At ${clock(air.time_s)} of the show. ${air.note}`);
+  setText(byId("air-note"), air.time_s > 0 ? `At ${clock(air.time_s)} of the show. ${air.note}` : air.note);
 }
 
 function drawMapSum() {
   const placed = state.drones.filter((drone) => drone.place_m).length;
   const far = state.drones.filter((drone) => drone.distance_m !== null);
   const worst = far.reduce((most, drone) => Math.max(most, drone.distance_m), 0);
-  setText(byId("map-sum"), `${placed} drones say where they are` +
+  setText(byId("map-sum"), `${placed} ${placed === 1 ? "drone has" : "drones have"} said where ${placed === 1 ? "it is" : "they are"}` +
     (far.length ? `; ${fixed(worst, 1)} m off their trajectories at most` : ""));
 }

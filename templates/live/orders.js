@@ -23,7 +23,7 @@ function drawScope() {
   const chosen = chosenDrones();
   const isOperator = Boolean(state.facts?.may_order) && !state.facts?.is_replay;
   /* Nobody carries out an order any more. A lost link may come back while somebody aims at the button. */
-  const isOver = document.body.dataset.connection === "ended" || state.frame?.step === "over";
+  const isOver = ["ended", "closed"].includes(document.body.dataset.connection) || state.frame?.step === "over";
   const may = isOperator && !isOver;
   byId("orders").hidden = Boolean(state.facts?.is_replay);
   for (const id of ["order-return", "order-land"]) byId(id).disabled = !may;

@@ -12,6 +12,9 @@ function drawReplay(replay) {
   setText(byId("replay-play"), replay.plays ? "Pause" : "Play");
   byId("replay-play").dataset.plays = replay.plays ? "yes" : "no";
   const speed = byId("replay-speed");
+  if (![...speed.options].some((option) => Number(option.value) === replay.speed)) {
+    speed.prepend(new Option(String(replay.speed)));
+  }
   if (document.activeElement !== speed) speed.value = String(replay.speed);
 }
 

@@ -29,7 +29,7 @@ function takeFacts(facts) {
   setText(byId("kind"), facts.is_replay ? "Replay" : "Live");
   setText(byId("flight"), facts.flight);
   setText(byId("title"), facts.title);
-  setText(byId("made"), `${facts.made_by}, site ${fixed(facts.origin_deg[0], 5)}°, ${fixed(facts.origin_deg[1], 5)}°`);
+  setText(byId("made"), `${facts.made_by}, ${facts.site || "site"} ${fixed(facts.origin_deg[0], 5)}°, ${fixed(facts.origin_deg[1], 5)}°`);
   drawScope();
 }
 
@@ -92,14 +92,35 @@ function open() {
   stream.addEventListener("links", (event) => takeLinks(JSON.parse(event.data)));
   stream.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
   stream.addEventListener("over", () => { over = true; });
-  stream.onopen = () => { over = false; connection("open", "connected"); gone(""); drawScope(); };
+  stream.onopen = () => { over = false; connection("open", "connected"); gone(""); drawScope(); drawBoardSum(); };
   stream.onerror = () => {
-    connection(over ? "ended" : "lost", over ? "station ended" : "lost");
+    const flying = state.drones.filter((drone) => drone.armed).length;
+    connection(over && !flying ? "ended" : "lost", over ? "station ended" : "lost");
     drawScope();
-    gone(over ? "The station has ended. The page goes on when it is started again."
-      : "No word from the station: what is shown is old. Trying again.");
-    if (stream.readyState === EventSource.CLOSED) setTimeout(open, 1500);
+    drawBoardSum();
+    gone(!over ? "No word from the station: what is shown is old. Trying again."
+      : flying ? `The station has ended with ${flying} ${flying === 1 ? "drone" : "drones"} in the air: nobody watches them. ` +
+        "“updraft fleet watch --live” takes over, “updraft fleet abort” sends them home."
+      : "The station has ended. The page goes on when it is started again.");
+    if (stream.readyState === EventSource.CLOSED) {
+      tellRefusal();
+      setTimeout(open, 1500);
+    }
   };
+}
+
+/** A station that answers, but not to this secret: another flight's, or one that was made anew. */
+async function tellRefusal() {
+  const stop = new AbortController();
+  try {
+    const answer = await fetch(`/events?token=${encodeURIComponent(state.token)}`, { signal: stop.signal });
+    if (answer.status === 401) {
+      connection("closed", "wrong secret");
+      gone("The station does not know the secret of this page: open the address that it has printed last.");
+      drawScope();
+    }
+  } catch { /* It does not answer, as is said already. */ }
+  stop.abort();
 }
 
 let over = false;

@@ -9,6 +9,8 @@ use crate::numeric::mean;
 
 /// Standard errors for which the length of an average is given, m/s.
 const ERRORS_MPS: [f64; 2] = [0.1, 0.2];
+/// Shorter times are none in tenths of minutes, min.
+const SHORTEST_MIN: f64 = 0.05;
 /// The fleet's mean counts where this share of the drones has a value.
 const FEWEST_SHARE: f64 = 0.5;
 
@@ -74,6 +76,12 @@ pub(in crate::analysis) fn minutes(needed: &NeededAverage, is_open: bool) -> Str
         format!("{value:.decimals$}")
     };
     let NeededAverage { minutes, interval_min, .. } = needed;
+    if is_open && interval_min.low < SHORTEST_MIN {
+        return "a time that this record does not tell".to_owned();
+    }
+    if !is_open && interval_min.high < SHORTEST_MIN {
+        return "less than 0.1 min".to_owned();
+    }
     if is_open {
         return format!("more than {} min", digits(interval_min.low));
     }

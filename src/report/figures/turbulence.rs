@@ -190,17 +190,23 @@ fn pairs((key, flight): &(&str, String), found: &Turbulence, format: Format) -> 
     let variance = found.vertical.as_ref().and_then(|up| up.variance);
     let mut panels = vec![covariance(found, variance.map(|of| [of.value, of.low, of.high]))?];
     let few = few(&found.distances);
-    panels.extend(coherence(&few));
+    let coherence = coherence(&few);
+    let of_coherence = if coherence.is_some() {
+        " (b) Squared coherence by frequency, mean of the pairs at some of the distances, corrected for its bias."
+    } else {
+        " The record is too short for the coherence."
+    };
+    panels.extend(coherence);
     let name = format!("turbulence-pairs-{key}");
     let title = format!("w at pairs of drones, {flight}");
     Some(Figure {
         svg: sheet(panels, format).svg(&name, &title),
         name,
         title,
-        caption: "(a) Mean covariance of w at pairs of drones by their distance, with the 95 % interval of one pair (pairs of \
-                  one fleet see the same eddies); at 0 m the variance. (b) Squared coherence by frequency, mean of the \
-                  pairs at some of the distances, corrected for its bias."
-            .to_owned(),
+        caption: format!(
+            "(a) Mean covariance of w at pairs of drones by their distance, with the 95 % interval of one pair (pairs of \
+             one fleet see the same eddies); at 0 m the variance.{of_coherence}"
+        ),
     })
 }
 

@@ -2,14 +2,19 @@
 
 use crate::analysis::Warning;
 use crate::analysis::WindHandled;
-use crate::analysis::result::{Analysis, CommonError, FlightAnalysis, UpdraftMap};
+use crate::analysis::result::{
+    Analysis, CommonError, DroneUpdraft, FlightAnalysis, Quality, UpdraftMap,
+};
 use crate::report::page::capitalised;
-use crate::report::text::{clean, count, fixed, sentence, usable};
+use crate::report::text::{clean, count, fixed, sentence, shortened, usable};
 
 /// Doubts that are told at the top; the others are counted.
 const MOST: usize = 4;
 /// True values inside 95 % intervals below which the intervals are called too narrow.
 const LEAST_INSIDE: f64 = 0.85;
+
+/// Columns of a drone's label.
+const LABEL: usize = 28;
 
 /// How bad a doubt is, and its words.
 type Doubt = (u8, String);
@@ -32,6 +37,7 @@ pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
         };
         doubts.extend(lost(flight).map(of));
         doubts.extend(damaged(flight).map(of));
+        doubts.extend(flight.map.as_ref().and_then(left_early).map(of));
         doubts.extend(flight.warnings.iter().map(doubt).map(of));
         doubts.extend(flight.map.as_ref().and_then(largest_error).map(of));
         doubts.extend(flight.map.as_ref().and_then(too_narrow).map(of));
@@ -65,6 +71,27 @@ fn lost(flight: &FlightAnalysis) -> Option<Doubt> {
     }
     let badness = if 2 * lost >= of { 0 } else { 5 };
     Some((badness, format!("{lost} of {} gave no result.", count(of, "drone"))))
+}
+
+/// Drones that were not there to the end.
+fn left_early(map: &UpdraftMap) -> Option<Doubt> {
+    let is_gone =
+        |drone: &&DroneUpdraft| drone.quality.iter().any(|doubt| doubt.flag == Quality::Incomplete);
+    let gone: Vec<&str> =
+        map.drones.iter().filter(is_gone).map(|drone| drone.name.as_str()).collect();
+    let first = shortened(gone.first()?, LABEL);
+    let of = map.drones.len();
+    Some((
+        3,
+        if gone.len() == 1 {
+            format!("{first}, one of {of}, came down before the hover's end, or its log ends.")
+        } else {
+            format!(
+                "{} of {of} drones came down, or their logs end, before the hover does.",
+                gone.len()
+            )
+        },
+    ))
 }
 
 type Part = fn(&CommonError) -> f64;

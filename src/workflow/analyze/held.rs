@@ -47,7 +47,7 @@ pub(super) fn read(path: &Path) -> Result<(FlightAnalysis, LawsFrom), WorkflowEr
 }
 
 /// What speaks against the laws of `reference`, read from `path`: one sentence, or nothing.
-pub(super) fn doubts(
+pub(in crate::workflow) fn doubts_of_held(
     path: &Path,
     reference: &FlightAnalysis,
     indicator: Indicator,

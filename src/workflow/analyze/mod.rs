@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 use self::fields::{read_study, write_fields};
 pub use self::gather::{Request, gather, load_plan};
+pub(super) use self::held::doubts_of_held;
 pub use self::settings::{Files, Settings, Uncorrected};
 use super::ending::Ending;
 use super::error::WorkflowError;
@@ -100,7 +101,7 @@ impl<'a> Analysing<'a> {
         let indicator = settings.options.indicator;
         let doubts = hold
             .zip(reference.as_ref())
-            .and_then(|(path, (reference, _))| held::doubts(path, reference, indicator, work));
+            .and_then(|(path, (reference, _))| doubts_of_held(path, reference, indicator, work));
         Ok(Self { host, work, settings, reference, doubts })
     }
 

@@ -1,6 +1,6 @@
 //! Start of a flight: its time, a person's leave, and the flight that follows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
@@ -121,10 +121,13 @@ pub(crate) fn say_landed(host: &dyn Host, crew: &Crew<'_>) -> bool {
 
 /// How the flight ends; what was lost is said.
 pub(crate) fn landed(host: &dyn Host, crew: &Crew<'_>, alarms: &Alarms) -> Ending {
-    let all = say_landed(host, crew);
-    let is_missing = |drone: &DroneId| !matches!(crew.ended(*drone), Ended::Landed);
-    let missing: Vec<DroneId> =
-        crew.table.drones.iter().map(|line| line.drone).filter(is_missing).collect();
+    say_landed(host, crew);
+    let who = |is: fn(&Ended) -> bool| -> Vec<DroneId> {
+        let all = crew.table.drones.iter().map(|line| line.drone);
+        all.filter(|drone| is(&crew.ended(*drone))).collect()
+    };
+    let on_ground = who(|ended| matches!(ended, Ended::NeverTookOff));
+    let missing = who(|ended| !matches!(ended, Ended::Landed | Ended::NeverTookOff));
     let ordered = crew.net.ordered_down();
     let mut why = Vec::new();
     let named = |drones: Vec<DroneId>| {
@@ -133,9 +136,10 @@ pub(crate) fn landed(host: &dyn Host, crew: &Crew<'_>, alarms: &Alarms) -> Endin
     };
     // Others were heard, too, and obey: they are none of this flight.
     let of_flight = |drone: &DroneId| crew.table.slot_of(*drone).is_some();
-    let ordered: Vec<DroneId> = ordered.into_keys().filter(of_flight).collect();
+    let ordered: BTreeSet<DroneId> =
+        ordered.into_keys().chain(crew.ordered_before.iter().copied()).filter(of_flight).collect();
     if !ordered.is_empty() {
-        why.push(format!("ordered down: drones {}", named(ordered)));
+        why.push(format!("ordered down: drones {}", named(ordered.into_iter().collect())));
     }
     if !alarms.is_empty() {
         let told: Vec<String> = alarms
@@ -148,8 +152,11 @@ pub(crate) fn landed(host: &dyn Host, crew: &Crew<'_>, alarms: &Alarms) -> Endin
             .collect();
         why.push(format!("alarms of {}", told.join(", ")));
     }
-    if !all {
-        // In which way each has not is said above.
+    // In which way each has not landed is said above.
+    if !on_ground.is_empty() {
+        why.push(format!("never took off: drones {}", named(on_ground)));
+    }
+    if !missing.is_empty() {
         why.push(format!("not seen to land: drones {}", named(missing)));
     }
     if why.is_empty() {

@@ -13,7 +13,7 @@ use super::agreement::{Agreement, Look};
 use super::of_map;
 use crate::analysis::battery::Sag;
 use crate::analysis::result::{FlightAnalysis, UpdraftMap};
-use crate::analysis::{AtHand, LogInput, analyze_flight};
+use crate::analysis::{AtHand, LogInput, Warning, analyze_flight};
 use crate::base::causes::with_causes;
 use crate::base::estimate::Estimate;
 use crate::base::plain::Shown as _;
@@ -28,7 +28,7 @@ use crate::vehicle::library;
 use crate::virtual_fleet::vehicle::REVISION;
 use crate::workflow::analysis_file::AnalysisFile;
 use crate::workflow::analyze::Settings;
-use crate::workflow::analyze::one_input;
+use crate::workflow::analyze::{doubts_of_held, one_input};
 use crate::workflow::clock::{Clock, Micros, S};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work, find, sag};
@@ -94,9 +94,8 @@ impl AirWatch {
     ) -> Result<Option<Self>, WorkflowError> {
         let mut work = Work::new(&wish.campaign);
         find(&wish.campaign, None, &mut work)?;
-        let Some(found) = work.flights.into_iter().find(|found| found.name == plan.name) else {
-            return Ok(None);
-        };
+        let found = work.flights.iter().find(|found| found.name == plan.name).cloned();
+        let Some(found) = found else { return Ok(None) };
         if found.purpose != Some(Purpose::Measurement) {
             return Ok(None);
         }
@@ -127,6 +126,13 @@ impl AirWatch {
             }
             Err(error) => return Err(error),
         };
+        if let Some(law) = &wish.law
+            && let Some(doubts) =
+                doubts_of_held(law, &reference, Settings::default().options.indicator, &work)
+        {
+            host.warn(&doubts);
+            station.say(Level::Warning, &doubts);
+        }
         station.keep_air(MOTORS);
         let note = format!("The first values come {FIRST_S:.0} s into the hover.");
         let first = AirView { provisional: true, note, ..AirView::default() };
@@ -261,19 +267,16 @@ fn look_again(
     // The station's own work has the other processors.
     let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return };
     let settings = Settings::default();
-    let mut has_told = false;
+    let (mut has_told, mut has_doubted) = (false, false);
     while !shared.is_over() {
         let (step, show_s) = station.moment();
         let flown = show_s.filter(|_| step == Step::Flying);
         if !has_told && flown.is_some_and(|show_s| show_s > ends_s) {
             has_told = true;
-            let note = "Telemetry told no air: there was too little of it, or no drone was left in the hover. The logs may \
-                        have more."
+            let note = "This station heard too little of the hover to tell its air: the logs will."
                 .to_owned();
-            station.air(
-                Some(AirView { provisional: true, note, ..AirView::default() }),
-                BTreeMap::new(),
-            );
+            let none = AirView { provisional: true, note, ..AirView::default() };
+            station.air(Some(none), BTreeMap::new());
         }
         let Some(show_s) = flown.filter(|show_s| (begins_s + FIRST_S..=ends_s).contains(show_s))
         else {
@@ -305,7 +308,14 @@ fn look_again(
             let looked = pool
                 .install(|| analyze_flight(&input, &settings.options, Some(reference), &|_, _| {}));
             // Too little was heard yet, for example: the next look may have more.
-            if let Some(map) = looked.ok().and_then(|flight| flight.map) {
+            let (map, warnings) =
+                looked.map_or_else(|_| (None, Vec::new()), |flight| (flight.map, flight.warnings));
+            let others = warnings.iter().find(|told| matches!(told, Warning::LawsOfOthers { .. }));
+            if let Some(others) = others.filter(|_| !has_doubted) {
+                has_doubted = true;
+                station.say(Level::Warning, &others.to_string());
+            }
+            if let Some(map) = map {
                 let (view, of) = shown(&map, from_s, &rates_hz);
                 let look = Look { time_s: view.time_s, of: of.clone() };
                 shared.looks.lock().unwrap_or_else(PoisonError::into_inner).push(look);
@@ -346,7 +356,7 @@ fn shown(
     }
     let cost_mps = cost_mps(rate_hz);
     let note = format!(
-        "From telemetry at {rate_hz:.1} Hz: the mean is over the last {span_s:.0} s, the colours are 10 s means. \
+        "From telemetry at {rate_hz:.1} Hz: {span_s:.0} s of the hover, and the colours are 10 s means. \
          At this rate a drone's own mean is off by {cost_mps:.2} m/s for want of messages. The logs tell it again, \
          and better."
     );

@@ -81,7 +81,14 @@ pub(crate) fn replay(
     let mut journal = of_journal(host, &work, &folders, found)?;
     let mut tracks = match found.logs[..] {
         [] => Vec::new(),
-        _ => tracks(host, found, plan, analysed)?,
+        _ => match tracks(host, found, plan, analysed) {
+            // Those of an earlier flight, as long as this one's are not home.
+            Err(WorkflowError::Nothing(reason)) if !journal.tracks.is_empty() => {
+                host.warn(&format!("{reason}; replayed from its journal alone"));
+                Vec::new()
+            }
+            read => read?,
+        },
     };
     let logged = tracks.len();
     let mut of_slot = std::mem::take(&mut journal.tracks);

@@ -7,9 +7,10 @@ use super::hear::hear_together;
 use crate::base::causes::with_causes;
 use crate::base::time::{GpsTime, WEEK_S};
 use crate::campaign::start::StartRecord;
+use crate::fleet::abort::Action;
 use crate::fleet::gate::State;
 use crate::fleet::messages::start_packet;
-use crate::fleet::recorded::{read as read_journal, seen_in_the_air};
+use crate::fleet::recorded::{drones_of_steps, read as read_journal, seen_in_the_air};
 use crate::fleet::slots::FleetTable;
 use crate::fleet::start::Start;
 use crate::link::clock::{MS, Micros, S};
@@ -19,6 +20,7 @@ use crate::link::net::Net as _;
 use crate::numeric::upper_median;
 use crate::protocol::show::{CLEAR_TIME, StartConfig, flag};
 use crate::workflow::error::WorkflowError;
+use crate::workflow::fleet::end::word;
 use crate::workflow::host::News;
 use crate::workflow::words::time_of_day;
 
@@ -175,6 +177,8 @@ impl Crew<'_> {
                 let seen = seen_in_the_air(&entries, since_unix_us);
                 self.flew.extend(seen.flew);
                 self.fell.extend(seen.fell);
+                let orders = [Action::Return, Action::Land].map(word);
+                self.ordered_before.extend(drones_of_steps(&entries, since_unix_us, &orders));
             }
             Err(error) => self.host.warn(&format!(
                 "{}; drones that have landed already are told to be on the ground",

@@ -84,6 +84,8 @@ pub(crate) struct Crew<'a> {
     flew: BTreeSet<DroneId>,
     /// Drones that have restarted there, and were not seen to fly on.
     fell: BTreeSet<DroneId>,
+    /// Drones that another station has ordered down in this flight.
+    pub(crate) ordered_before: BTreeSet<DroneId>,
     /// The flight was on its way before this program looked.
     attached: bool,
 }
@@ -157,6 +159,7 @@ impl<'a> Crew<'a> {
             on_interrupt: Choice::Return,
             held: BTreeMap::new(),
             flew: BTreeSet::new(),
+            ordered_before: BTreeSet::new(),
             fell: BTreeSet::new(),
             attached: false,
         }

@@ -248,7 +248,7 @@ impl<'a> Crew<'a> {
     pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Eyes<'a> {
         self.host.news(&News::Assigned(&self.table));
         self.host.news(&News::Start(start_gps_ms));
-        self.step(Step::Flying, "Waiting for every drone to land; then their logs are downloaded");
+        self.step(Step::Flying, "Waiting for every drone to fly its show and to land");
         let telemetry = std::mem::take(&mut self.telemetry);
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
