@@ -13,6 +13,7 @@ use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
 
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
+#[cfg(feature = "netcdf-input")]
 pub(crate) use time::seconds_of;
 
 pub use read::{Columns, Wish, read, read_columns, read_from};
