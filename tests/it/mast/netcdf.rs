@@ -125,7 +125,7 @@ fn a_file_says_what_its_table_says() {
     let mut table = "utc,w\n".to_owned();
     for (index, (time_s, w)) in of_mast.iter().enumerate() {
         if index % 50 != 7 {
-            writeln!(table, "{time_s:.3},{:.3}", w).unwrap();
+            writeln!(table, "{time_s:.3},{w:.3}").unwrap();
         }
     }
     fs::write(bench.path("tower.csv"), table).unwrap();
