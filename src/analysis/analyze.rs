@@ -48,6 +48,7 @@ use super::wind_forms::{Belief, WindForms};
 use super::wind_legs;
 use crate::flight::Indicator;
 use crate::mission::plan::{Group, Purpose, Segment, SegmentKind};
+use crate::numeric::mean;
 
 /// Progress callback, called after each log with (logs done, logs in all).
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
@@ -575,6 +576,8 @@ fn turbulence_of(
         orientation_deg: shared.input.plan.map(|plan| plan.site.orientation_deg),
         wind: statistics.and_then(|found| found.wind.as_ref()),
         drag_share: shared.drag().share(),
+        height_m: mean(map.drones.iter().map(|drone| drone.height_m)),
+        mixed_layer_depth_m: shared.options.mixed_layer_depth_m,
     };
     turbulence::of_fleet(&drones, asked)
 }

@@ -37,6 +37,9 @@ pub struct AnalysisOptions {
     /// Whether the map is also made as one estimate of all drones and seconds together, which takes most of the time of an
     /// analysis; without it there is no air between the drones, and there are no thermals.
     pub posterior: bool,
+    /// Depth of the mixed layer above the ground, m, which no drone sees; `None`: not known, and no convective velocity
+    /// scale is told.
+    pub mixed_layer_depth_m: Option<f64>,
     /// Largest number of points of a trace for figures.
     pub trace_points: usize,
 }
@@ -76,6 +79,7 @@ impl Default for AnalysisOptions {
             statistics: StatisticsOptions::default(),
             plain: false,
             posterior: true,
+            mixed_layer_depth_m: None,
             trace_points: 1200,
         }
     }

@@ -8,6 +8,8 @@ pub mod estimate;
 pub mod json;
 pub mod layout;
 pub mod markup;
+#[cfg(feature = "netcdf-input")]
+pub mod netcdf;
 pub mod own_folder;
 pub(crate) mod said;
 pub mod sentence;

@@ -392,9 +392,26 @@ pub fn fields_grid_netcdf(folder: &Path, flight: Option<&str>) -> PathBuf {
     folder.join("fields").join(name)
 }
 
+/// Path of turbulence as NetCDF, in the folder of an analysis; of one flight where several have it.
+pub fn fields_turbulence_netcdf(folder: &Path, flight: Option<&str>) -> PathBuf {
+    let name = match flight {
+        Some(flight) => format!("{TURBULENCE_STEM}-{}.nc", file_part(flight)),
+        None => format!("{TURBULENCE_STEM}.nc"),
+    };
+    folder.join("fields").join(name)
+}
+
+/// Begin of the names of turbulence.
+const TURBULENCE_STEM: &str = "turbulence";
+
 /// Path of a table of turbulence as CSV, in the folder of an analysis.
 pub fn fields_turbulence(folder: &Path, stem: &str) -> PathBuf {
     folder.join("fields").join(format!("{stem}.csv"))
+}
+
+/// Path of the table of thermals over time, in the folder of an analysis.
+pub fn fields_thermals(folder: &Path) -> PathBuf {
+    folder.join("fields").join("thermals.csv")
 }
 
 /// Path of the drones on a map as GeoJSON, in the folder of an analysis.
@@ -418,14 +435,23 @@ fn file_part(name: &str) -> String {
 
 /// Grids as NetCDF that are there, in the folder of an analysis, by name.
 pub fn fields_grids_netcdf(folder: &Path) -> Vec<PathBuf> {
-    let is_grid = |path: &PathBuf| {
+    netcdf_of(folder, GRID_STEM)
+}
+
+/// Turbulence as NetCDF that is there, in the folder of an analysis, by name.
+pub fn fields_turbulences_netcdf(folder: &Path) -> Vec<PathBuf> {
+    netcdf_of(folder, TURBULENCE_STEM)
+}
+
+fn netcdf_of(folder: &Path, stem: &str) -> Vec<PathBuf> {
+    let is_one = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with(GRID_STEM) && name.ends_with(".nc")
+        name.starts_with(stem) && name.ends_with(".nc")
     };
     let there = std::fs::read_dir(folder.join("fields")).into_iter().flatten().flatten();
-    let mut grids: Vec<PathBuf> = there.map(|entry| entry.path()).filter(is_grid).collect();
-    grids.sort();
-    grids
+    let mut files: Vec<PathBuf> = there.map(|entry| entry.path()).filter(is_one).collect();
+    files.sort();
+    files
 }
 
 /// Path of the simulation study that belongs to a campaign.

@@ -35,6 +35,8 @@ use crate::workflow::paper::PaperFigures;
 
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
+/// Depths of the mixed layer that are taken, m.
+const DEPTHS_M: (f64, f64) = (10.0, 10_000.0);
 
 /// Arguments of `updraft analyze`.
 #[derive(Debug, Args)]
@@ -43,6 +45,7 @@ const WIDTH: usize = 100;
   updraft analyze logs/ --plan my-campaign/calibration
   updraft analyze flight.BIN
   updraft analyze windy --hold still/analysis.json
+  updraft analyze my-campaign --mixed-layer-depth 1200   (turbulence with w*)
   updraft analyze --each season/*                 (each campaign by itself)
   updraft analyze --csv phantom4-mast.toml --zero 0..150s --vehicle phantom4
 
@@ -126,6 +129,10 @@ pub(super) struct AnalyzeOptions {
     /// laws alone, as with --plain
     #[arg(long)]
     paper: bool,
+    /// Depth of the mixed layer above the ground, m, by whoever knows it (a sounding, a model): turbulence then has the
+    /// convective velocity scale w*
+    #[arg(long, value_name = "M", value_parser = depth)]
+    mixed_layer_depth: Option<f64>,
     /// Give the paper's own estimate, for comparison: its two laws alone, and the map drone by drone
     /// and second by second from them (eqs. 6 and 7)
     #[arg(long)]
@@ -236,12 +243,23 @@ impl AnalyzeOptions {
             OffsetChoice::Never => OffsetRule::Never,
         };
         options.paper_windows = self.paper;
+        options.mixed_layer_depth_m = self.mixed_layer_depth;
         options.plain = self.plain || self.paper;
         let Uncorrected { no_density, no_battery, no_wind } = self.without;
         let without = Without { density: no_density, battery: no_battery, wind: no_wind };
         let combine = self.indicator == IndicatorChoice::All;
         Settings { options, without, combine, files: Files::default() }
     }
+}
+
+/// A depth of the mixed layer, m.
+fn depth(text: &str) -> Result<f64, String> {
+    let depth_m: f64 =
+        text.trim().parse().map_err(|_| "it must be a number of metres".to_owned())?;
+    if (DEPTHS_M.0..=DEPTHS_M.1).contains(&depth_m) {
+        return Ok(depth_m);
+    }
+    Err(format!("mixed layers are {} to {} m deep", DEPTHS_M.0, DEPTHS_M.1))
 }
 
 /// What `--json` prints.

@@ -27,6 +27,7 @@ const MIN_WIDTH: usize = 60;
   updraft compare old/analysis.json new/analysis.json --law linear
   updraft compare monday tuesday --json | jq '.laws[].drones[] | select(.is_changed)'
   updraft compare monday --mast tower.csv -o beside    # its map beside an instrument (docs/mast.md)
+  updraft compare monday --mast tower.nc               # of several heights, the nearest to the drones
 
 Says whether the fleet as a whole changed (air density, battery, temperature, air during a calibration),
 and which drones changed by more than the fleet: a weak motor, a propeller, weight. Drones are known by
@@ -41,8 +42,8 @@ pub(super) struct CompareArgs {
     /// Analysed campaigns, folders with an analysis.json, or such files; the first is the reference
     #[arg(value_name = "CAMPAIGN", required = true, num_args = 1..)]
     campaigns: Vec<PathBuf>,
-    /// Record of a mast to compare one campaign with: a table with the columns utc and w, or a description of one (TOML;
-    /// docs/mast.md)
+    /// Record of a mast to compare one campaign with: a table with the columns utc and w, NetCDF, or a description of
+    /// one of both (TOML; docs/mast.md). Means over minutes are compared as such
     #[arg(long, value_name = "FILE", conflicts_with = "law")]
     mast: Option<PathBuf>,
     /// Folder for compare.json (mast.json) and report/index.html [default: nothing is written]

@@ -1,22 +1,23 @@
 //! The comparison itself.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::path::Path;
 
-use turbulence_statistics::spectrum::{Instrument, cross, mean, spectrum};
+use turbulence_statistics::spectrum::{Band, Instrument, cross, mean, spectrum};
 use turbulence_statistics::transfer::Transfer;
 use turbulence_statistics::{Record, moments};
 
-use super::MastError;
 use super::matched::{averages, best_shift, matched};
 use super::record::MastRecord;
 use super::result::{
     Average, MAST_SCHEMA, MastComparison, MastDrone, MastFlight, MastSeries, Matched,
 };
+use super::{MastError, slow};
 use crate::analysis::result::Analysis;
 use crate::base::frame::{Geodetic, ShowFrame};
 use crate::numeric;
-use crate::products::fields::{FieldRow, rows};
+use crate::products::fields::{FieldRow, ids, rows};
 use crate::products::iso;
 
 /// Time over which both are averaged, s.
@@ -35,22 +36,22 @@ const HIGHEST_HZ: f64 = 0.044;
 const FEWEST_SECONDS: usize = 30;
 
 /// Ten-second means of one drone, second by second.
-struct Drone {
-    label: String,
-    slot: Option<u16>,
-    values: BTreeMap<i64, Value>,
-    place_deg: Option<[f64; 2]>,
-    height_m: Option<f64>,
+pub(super) struct Drone {
+    pub(super) label: String,
+    pub(super) slot: Option<u16>,
+    pub(super) values: BTreeMap<i64, Value>,
+    pub(super) place_deg: Option<[f64; 2]>,
+    pub(super) height_m: Option<f64>,
 }
 
 /// A drone's value in one second.
 #[derive(Clone, Copy)]
-struct Value {
-    w: f64,
-    se: f64,
-    noise: f64,
-    interval: [f64; 2],
-    wind: Option<[f64; 2]>,
+pub(super) struct Value {
+    pub(super) w: f64,
+    pub(super) se: f64,
+    pub(super) noise: f64,
+    pub(super) interval: [f64; 2],
+    pub(super) wind: Option<[f64; 2]>,
 }
 
 /// Compares the flights of an analysis with a mast's record. `campaign` stands in messages, `made_by`: program and version.
@@ -72,7 +73,7 @@ pub fn compare(
     }
     let (mut compared, mut reasons) = (Vec::new(), Vec::new());
     for (name, rows) in &flights {
-        match flight(name, rows, mast) {
+        match flight(name, rows, mast, fast_part(analysis, name)) {
             Ok(flight) => compared.push(flight),
             Err(reason) => reasons.push(format!("{name}: {reason}")),
         }
@@ -94,6 +95,7 @@ pub fn compare(
         mast: mast.name.clone(),
         mast_height_m: mast.height_m,
         mast_step_s: mast.step_s,
+        mast_mean_s: mast.slow_s,
         flights: compared,
         notes: mast.notes.iter().cloned().chain(reasons).collect(),
     })
@@ -132,7 +134,12 @@ fn drones(rows: &[FieldRow]) -> Vec<Drone> {
 }
 
 /// A flight beside the mast.
-fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight, String> {
+fn flight(
+    name: &str,
+    rows: &[FieldRow],
+    mast: &MastRecord,
+    fast: Option<f64>,
+) -> Result<MastFlight, String> {
     let mut drones = drones(rows);
     if drones.is_empty() {
         return Err("the times of its values are not known in UTC (no clock in the logs; for a table, utc_offset_h)".to_owned());
@@ -148,26 +155,25 @@ fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight
         return Err("its drones' clocks are more than a week apart".to_owned());
     }
     let seconds: Vec<i64> = (from..=to).collect();
+    if let Some(place) = mast.place_deg {
+        let away =
+            |drone: &Drone| drone.place_deg.map_or(f64::INFINITY, |deg| distance_m(place, deg));
+        drones.sort_by(|a, b| away(a).total_cmp(&away(b)));
+    }
+    if let Some(length_s) = mast.slow_s {
+        return slow::flight(name, &drones, &seconds, (mast, length_s), fast)
+            .map_err(|reason| format!("{reason}{}", spans(mast, [from, to])));
+    }
     let of_mast: Vec<f64> = seconds
         .iter()
         .map(|at| mast.mean(&mast.w, at * 1000, MEAN_S).unwrap_or(f64::NAN))
         .collect();
     let both = of_mast.iter().filter(|value| value.is_finite()).count();
     if both < FEWEST_SECONDS {
-        let [first, last] = mast.span_ms();
         return Err(format!(
-            "{both} s are in both records, and {FEWEST_SECONDS} are the least: the flight is from {} to {}, the mast's record \
-             from {} to {}",
-            iso(from * 1000),
-            iso(to * 1000),
-            iso(first),
-            iso(last)
+            "{both} s are in both records, and {FEWEST_SECONDS} are the least{}",
+            spans(mast, [from, to])
         ));
-    }
-    if let Some(place) = mast.place_deg {
-        let away =
-            |drone: &Drone| drone.place_deg.map_or(f64::INFINITY, |deg| distance_m(place, deg));
-        drones.sort_by(|a, b| away(a).total_cmp(&away(b)));
     }
     let columns: Vec<Vec<f64>> =
         drones.iter().map(|drone| column(drone, &seconds, |value| value.w)).collect();
@@ -215,9 +221,12 @@ fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight
     Ok(MastFlight {
         flight: name.to_owned(),
         span_ms: [from * 1000, to * 1000],
+        mean_s: MEAN_S,
+        periods: Vec::new(),
+        period_variance: None,
         averages: longer(&fleet, &nearest, &of_mast, stated),
         mast_variance: moments::variance(&of_mast_record, 0.0, 0.0),
-        mast_variance_all: variance_of(&own),
+        mast_variance_all: Some(variance_of(&own)),
         drone_variance: moments::mean_variance(&refs, &noise, 0.0),
         mast_spectrum: spectrum(&of_mast_record, &instrument),
         drone_spectrum: mean(&refs, &instrument),
@@ -239,16 +248,54 @@ fn flight(name: &str, rows: &[FieldRow], mast: &MastRecord) -> Result<MastFlight
     })
 }
 
+/// Times of a flight (s since 1970) and of a mast's record, for messages.
+fn spans(mast: &MastRecord, [from, to]: [i64; 2]) -> String {
+    let [first, last] = mast.span_ms();
+    format!(
+        ": the flight is from {} to {}, the mast's record from {} to {}",
+        iso(from * 1000),
+        iso(to * 1000),
+        iso(first),
+        iso(last)
+    )
+}
+
+/// Variance of w in the eddies that ten-second means have not, (m/s)²: of the spectrum of a flight's turbulence, as far as
+/// it is told.
+fn fast_part(analysis: &Analysis, name: &str) -> Option<f64> {
+    let ids = ids(analysis);
+    let (flight, _) = analysis.flights.iter().zip(&ids).find(|(_, id)| *id == name)?;
+    missed(&flight.turbulence.as_ref()?.vertical.as_ref()?.spectrum)
+}
+
+/// Variance that means over ten seconds take from a spectrum, by the rule of trapezoids.
+fn missed(bands: &[Band]) -> Option<f64> {
+    let lost = |band: &Band| {
+        let turned = PI * band.frequency_hz * MEAN_S;
+        band.density * (1.0 - (turned.sin() / turned).powi(2))
+    };
+    let parts = bands.windows(2).map(|pair| {
+        0.5 * (lost(&pair[0]) + lost(&pair[1])) * (pair[1].frequency_hz - pair[0].frequency_hz)
+    });
+    (bands.len() > 1).then(|| parts.sum::<f64>()).filter(|part| part.is_finite())
+}
+
+/// Median height of the drones above the ground, m, if their logs or the plan tell.
+pub fn drones_height_m(analysis: &Analysis) -> Option<f64> {
+    let placed = rows(analysis).filter(|row| row.fix.lat_lon_deg.is_some());
+    numeric::median(placed.filter_map(|row| row.fix.height_m).collect())
+}
+
 /// A flight with its mast is not longer, s.
 const MOST_SECONDS: usize = 7 * 86_400;
 
-fn column(drone: &Drone, seconds: &[i64], of: impl Fn(&Value) -> f64) -> Vec<f64> {
+pub(super) fn column(drone: &Drone, seconds: &[i64], of: impl Fn(&Value) -> f64) -> Vec<f64> {
     seconds.iter().map(|at| drone.values.get(at).map_or(f64::NAN, &of)).collect()
 }
 
 /// Mean of the drones in each second, with its standard error: most of an error is common to all drones, so that the mean
 /// is no better than the drones' own.
-fn fleet(drones: &[Drone], seconds: &[i64]) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn fleet(drones: &[Drone], seconds: &[i64]) -> (Vec<f64>, Vec<f64>) {
     let enough = drones.len().div_ceil(2);
     let mean = |at: &i64| {
         let values: Vec<&Value> = drones.iter().filter_map(|drone| drone.values.get(at)).collect();
@@ -262,18 +309,18 @@ fn fleet(drones: &[Drone], seconds: &[i64]) -> (Vec<f64>, Vec<f64>) {
     seconds.iter().map(mean).unzip()
 }
 
-fn mean_of(values: &[f64]) -> Option<f64> {
+pub(super) fn mean_of(values: &[f64]) -> Option<f64> {
     numeric::mean(values.iter().filter(|value| value.is_finite()))
 }
 
-fn variance_of(values: &[f64]) -> f64 {
+pub(super) fn variance_of(values: &[f64]) -> f64 {
     let mean = mean_of(values).unwrap_or(0.0);
     let squares: Vec<f64> = values.iter().map(|value| (value - mean).powi(2)).collect();
     mean_of(&squares).unwrap_or(0.0)
 }
 
 /// Mean variance of a drone's own noise, (m/s)².
-fn noise2(drone: &Drone) -> f64 {
+pub(super) fn noise2(drone: &Drone) -> f64 {
     let squares: Vec<f64> = drone.values.values().map(|value| value.noise.powi(2)).collect();
     mean_of(&squares).unwrap_or(0.0)
 }
@@ -336,9 +383,31 @@ fn wind(drones: &[Drone], seconds: &[i64], mast: &MastRecord) -> Option<[Matched
 }
 
 /// Horizontal distance of two places, m.
-fn distance_m([lat_deg, lon_deg]: [f64; 2], other: [f64; 2]) -> f64 {
+pub(super) fn distance_m([lat_deg, lon_deg]: [f64; 2], other: [f64; 2]) -> f64 {
     let origin = Geodetic { lat_deg, lon_deg, amsl_m: 0.0 };
     let frame = ShowFrame { origin, orientation_deg: 0.0 };
     let place = frame.from_geodetic(Geodetic { lat_deg: other[0], lon_deg: other[1], amsl_m: 0.0 });
     place.x.hypot(place.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_second_means_miss_what_is_faster() {
+        let band = |frequency_hz: f64| Band {
+            frequency_hz,
+            density: 0.5,
+            low: 0.0,
+            high: 1.0,
+            freedom: 10.0,
+        };
+        let fine: Vec<Band> = (1..=2000).map(|k| band(5e-4 * f64::from(k))).collect();
+        // Of white noise up to 1 Hz a mean over 10 s leaves 1/20 Hz.
+        let found = missed(&fine).unwrap();
+        assert!((found - 0.5 * 0.95).abs() < 2e-3, "{found}");
+        assert!(missed(&fine[..80]).unwrap() < 0.2 * 0.5 * 0.04, "slow air is in the means");
+        assert!(missed(&fine[..1]).is_none());
+    }
 }

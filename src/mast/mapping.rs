@@ -1,4 +1,4 @@
-//! Description of a mast's table: TOML, or the names of its columns alone.
+//! Description of a mast's record: TOML, or the names of a table's columns alone.
 
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,25 @@ const SCHEMA: &str = "updraft.mast/1";
 const MAX_BYTES: u64 = 1 << 20;
 /// Names by which columns are known without a description, in the order in which they are tried.
 const TIMES: [&str; 5] = ["utc", "time", "timestamp", "datetime", "date"];
-const UP: [&str; 3] = ["w_mps", "w", "upward_air_velocity"];
-const EAST: [&str; 3] = ["u_mps", "u", "eastward_wind"];
-const NORTH: [&str; 3] = ["v_mps", "v", "northward_wind"];
+pub(super) const UP: [&str; 3] = ["w_mps", "w", "upward_air_velocity"];
+pub(super) const EAST: [&str; 3] = ["u_mps", "u", "eastward_wind"];
+pub(super) const NORTH: [&str; 3] = ["v_mps", "v", "northward_wind"];
+pub(super) const UP_VARIANCE: [&str; 4] = ["w_variance", "w_var", "var_w", "variance_w"];
+pub(super) const UP_SD: [&str; 6] = ["w_sd", "w_std", "sd_w", "std_w", "sigma_w", "w_stddev"];
 
-/// Description of a mast's table.
+/// Which time of a mean its time in the record is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stamp {
+    /// The time of its begin.
+    Start,
+    /// The time of its middle.
+    Middle,
+    /// The time of its end, as loggers write it.
+    End,
+}
+
+/// Description of a mast's table or NetCDF file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MastMapping {
@@ -28,15 +42,21 @@ pub struct MastMapping {
     /// Name of the mast, for people.
     #[serde(default)]
     pub name: String,
-    /// Table of the mast, relative to the description.
+    /// Table or NetCDF file of the mast, relative to the description.
     pub file: PathBuf,
     /// Character between the cells.
     #[serde(default = "comma")]
     pub delimiter: char,
-    /// Column of times, and its format. Numbers count since 1970.
-    pub time: TimeColumn,
-    /// Vertical air speed, m/s, up positive.
-    pub w: Channel,
+    /// Column of times, and its format; numbers count since 1970. A NetCDF file may say both itself.
+    pub time: Option<TimeColumn>,
+    /// Which time of a mean its time is, of records of slow means.
+    pub stamp: Option<Stamp>,
+    /// Vertical air speed, m/s, up positive. A NetCDF file may say itself which variable it is.
+    pub w: Option<Channel>,
+    /// Variance of w within each mean, (m/s)².
+    pub w_variance: Option<Channel>,
+    /// Standard deviation of w within each mean, m/s, where there is no variance.
+    pub w_sd: Option<Channel>,
     /// Wind towards east, m/s.
     pub u: Option<Channel>,
     /// Wind towards north, m/s.
@@ -66,7 +86,9 @@ impl MastMapping {
             parse::toml(text).map_err(|error| wrong(parse::toml_trouble(text, &error)))?;
         mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
         // Times that are of no known zone could be anywhere: those of masts are UTC unless it is said otherwise.
-        mapping.time.utc_offset_h.get_or_insert(0.0);
+        if let Some(time) = &mut mapping.time {
+            time.utc_offset_h.get_or_insert(0.0);
+        }
         mapping.file = path.parent().unwrap_or(Path::new("")).join(&mapping.file);
         Ok(mapping)
     }
@@ -101,8 +123,11 @@ impl MastMapping {
             name,
             file: path.to_owned(),
             delimiter: ',',
-            time: TimeColumn { column, format, utc_offset_h: Some(0.0) },
-            w,
+            time: Some(TimeColumn { column, format, utc_offset_h: Some(0.0) }),
+            stamp: None,
+            w: Some(w),
+            w_variance: find(&UP_VARIANCE).map(channel),
+            w_sd: find(&UP_SD).filter(|_| find(&UP_VARIANCE).is_none()).map(channel),
             u: find(&EAST).map(channel),
             v: find(&NORTH).map(channel),
             latitude_deg: None,
@@ -118,20 +143,50 @@ impl MastMapping {
             .find_map(|name| heads.iter().position(|head| head.trim().eq_ignore_ascii_case(name)))
     }
 
-    /// Columns that are read.
-    pub(super) fn wish(&self) -> Wish<'_> {
-        let wind = [("u", &self.u), ("v", &self.v)];
-        let wind = wind.into_iter().filter_map(|(name, channel)| Some((name, channel.as_ref()?)));
-        let channels = std::iter::once(("w", &self.w)).chain(wind).collect();
-        Wish { delimiter: self.delimiter, time: &self.time, channels }
+    /// A quantity by the name of its table: `w`, `u`, `v`, `w_variance`, `w_sd`.
+    pub fn channel(&self, key: &str) -> Option<&Channel> {
+        self.channels().into_iter().find(|(name, _)| *name == key).map(|(_, channel)| channel)
+    }
+
+    fn channels(&self) -> Vec<(&'static str, &Channel)> {
+        let all = [
+            ("w", &self.w),
+            ("u", &self.u),
+            ("v", &self.v),
+            ("w_variance", &self.w_variance),
+            ("w_sd", &self.w_sd),
+        ];
+        all.into_iter().filter_map(|(name, channel)| Some((name, channel.as_ref()?))).collect()
+    }
+
+    /// Columns that are read of a table.
+    ///
+    /// # Errors
+    /// [`MastError`]: the part that a table needs and the description does not say.
+    pub(super) fn wish(&self) -> Result<Wish<'_>, MastError> {
+        let missing = |key: &str| MastError::Record {
+            path: self.file.clone(),
+            reason: format!("it is a table, and the mapping has no [{key}] with its column"),
+        };
+        let time = self.time.as_ref().ok_or_else(|| missing("time"))?;
+        if self.w.is_none() {
+            return Err(missing("w"));
+        }
+        Ok(Wish { delimiter: self.delimiter, time, channels: self.channels() })
     }
 
     fn refusal(&self) -> Option<String> {
         if self.schema != SCHEMA {
             return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
         }
-        if let Some(reason) = self.wish().refusal() {
+        let any = TimeColumn { column: String::new(), format: TimeFormat::S, utc_offset_h: None };
+        let time = self.time.as_ref().unwrap_or(&any);
+        let all = Wish { delimiter: self.delimiter, time, channels: self.channels() };
+        if let Some(reason) = all.refusal() {
             return Some(reason);
+        }
+        if self.w_variance.is_some() && self.w_sd.is_some() {
+            return Some("w_variance and w_sd say the same: give one of them".to_owned());
         }
         if self.u.is_some() != self.v.is_some() {
             return Some("u and v are given both or not at all".to_owned());

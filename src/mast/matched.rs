@@ -6,10 +6,10 @@ use super::result::Matched;
 
 /// Share of an average's seconds that both records must have.
 const COVERED: f64 = 0.8;
-/// Fewer pairs say nothing.
+/// Fewer pairs have a mean difference alone.
 const FEWEST: usize = 3;
 
-/// Agreement of `drones` with `mast`, value by value at steps of `step_s`; NaN: not known. `None` of fewer than three pairs.
+/// Agreement of `drones` with `mast`, value by value at steps of `step_s`; NaN: not known. `None` without a pair.
 pub fn matched(
     drones: &[f64],
     mast: &[f64],
@@ -23,9 +23,10 @@ pub fn matched(
         .filter(|(mast, drone)| mast.is_finite() && drone.is_finite())
         .collect();
     let count = pairs.len();
-    if count < FEWEST {
+    if count == 0 {
         return None;
     }
+    let is_enough = count >= FEWEST;
     let n = count as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
     let (mast_mean, drone_mean) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
@@ -35,17 +36,21 @@ pub fn matched(
     let xx = mean(&|pair| (pair.0 - mast_mean).powi(2));
     let yy = mean(&|pair| (pair.1 - drone_mean).powi(2));
     let xy = mean(&|pair| (pair.0 - mast_mean) * (pair.1 - drone_mean));
-    let slope = (xx > 0.0).then(|| xy / xx);
+    let slope = (is_enough && xx > 0.0).then(|| xy / xx);
     Some(Matched {
         count,
         mast_mean_mps: mast_mean,
         bias_mps: bias,
-        bias_se_mps: sd
-            * (1.0 / n).max(2.0 * integral_s(drones, mast, step_s) / (n * step_s)).sqrt(),
+        bias_se_mps: is_enough.then(|| {
+            let time_s = integral_s(drones, mast, step_s);
+            // Few values have their mean taken off, which they are the nearer to.
+            let independent = (1.0 / (n - 1.0)).max(2.0 * time_s / (n * step_s));
+            sd * independent.sqrt()
+        }),
         stated_se_mps,
         rms_mps: rms,
         sd_mps: sd,
-        correlation: (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt()),
+        correlation: (is_enough && xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt()),
         slope,
         intercept_mps: slope.map(|slope| drone_mean - slope * mast_mean),
     })
@@ -112,6 +117,8 @@ mod tests {
         let mast = [1.0, 2.0, f64::NAN, 4.0, 5.0];
         let found = matched(&with, &mast, 1.0, None).unwrap();
         assert_eq!((found.count, found.bias_mps), (3, 0.0));
-        assert!(matched(&with[..2], &mast, 1.0, None).is_none());
+        let one = matched(&with[..1], &mast, 1.0, None).unwrap();
+        assert_eq!((one.count, one.bias_se_mps, one.correlation), (1, None, None));
+        assert!(matched(&with[1..2], &mast, 1.0, None).is_none());
     }
 }

@@ -1,13 +1,18 @@
 //! A campaign beside a mast: what its drones measured against an instrument that stands still.
 //!
 //! Both are running means over ten seconds at the same times ([`mod@matched`]), compared as they are and in longer averages
-//! ([`make`]). Nothing is taken from the mast: neither a zero nor a scale.
+//! ([`make`]); a mast whose values are slower means is compared in those. Nothing is taken from the mast: neither a zero nor
+//! a scale.
 
 pub mod make;
 pub mod mapping;
 pub mod matched;
+#[cfg(feature = "netcdf-input")]
+mod netcdf;
+mod raw;
 pub mod record;
 pub mod result;
+mod slow;
 
 use std::path::PathBuf;
 
@@ -44,6 +49,16 @@ pub enum MastError {
     Record {
         /// Path of the record.
         path: PathBuf,
+        /// Statement of the problem, and what to do.
+        reason: String,
+    },
+    /// A variable of a NetCDF record cannot be used.
+    #[error("{}, variable {variable}: {reason}", path.shown())]
+    Variable {
+        /// Path of the record.
+        path: PathBuf,
+        /// Name of the variable.
+        variable: String,
         /// Statement of the problem, and what to do.
         reason: String,
     },

@@ -4,7 +4,8 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::MastError;
-use super::mapping::MastMapping;
+use super::mapping::{MastMapping, Stamp};
+use super::raw::Raw;
 use crate::base::file::{FileError, open_named};
 use crate::flight::Series;
 use crate::flight::table::read_columns;
@@ -12,15 +13,20 @@ use crate::numeric::median;
 
 /// Longest first lines that are looked at for names of columns, bytes.
 const HEAD_BYTES: u64 = 64 << 10;
-/// Values of a mast are no further apart than this, s: they are averaged over ten seconds.
+/// Values that are further apart than this, or means over more, s, are compared mean by mean: drones are averaged over
+/// ten seconds.
 const SLOWEST_S: f64 = 5.0;
+/// Longer means are none of the air at a place, s.
+const LONGEST_S: f64 = 3600.0;
 /// Share of the values that a mean must have.
 const COVERED: f64 = 0.8;
+/// First bytes of NetCDF files, classic and NetCDF-4.
+const MAGIC: [&[u8]; 2] = [b"CDF", b"\x89HDF"];
 
 /// Record of a mast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MastRecord {
-    /// Table that it was read from.
+    /// Table or NetCDF file that it was read from.
     pub file: PathBuf,
     /// Name of the mast.
     pub name: String,
@@ -32,8 +38,13 @@ pub struct MastRecord {
     pub zero_ms: i64,
     /// Distance between values, s.
     pub step_s: f64,
+    /// Duration of the means that its values are, s, where it is slow: compared mean by mean. Times are then those of
+    /// the means' middles.
+    pub slow_s: Option<f64>,
     /// Vertical air speed, m/s, up positive.
     pub w: Series,
+    /// Variance of w within each mean, (m/s)², if measured.
+    pub w_variance: Option<Series>,
     /// Wind towards east and north, m/s, if measured.
     pub wind: Option<[Series; 2]>,
     /// Doubts about how it was read, a sentence each.
@@ -41,45 +52,95 @@ pub struct MastRecord {
 }
 
 impl MastRecord {
-    /// Reads a table (`.csv`), or the description of one (`.toml`).
+    /// Reads a table (`.csv`), a NetCDF file, or the description of one of both (`.toml`). `near_m`: height of the drones
+    /// above the ground, m, if known: of a mast with several heights the nearest is taken.
     ///
     /// # Errors
     /// [`MastError`]: what is missing or wrong, and where.
-    pub fn read(path: &Path) -> Result<Self, MastError> {
+    pub fn read(path: &Path, near_m: Option<f64>) -> Result<Self, MastError> {
         let is = |end: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(end));
-        let mapping = if is("toml") { MastMapping::load(path)? } else { by_heads(path)? };
-        let columns = read_columns(&mapping.file, &mapping.wish())?;
-        let broken = |reason: String| MastError::Record { path: mapping.file.clone(), reason };
-        let start = columns.start.ok_or_else(|| broken("its times are no dates".to_owned()))?;
-        let mut notes = columns.warnings;
-        let (mut w, mut u, mut v) = (Series::default(), None, None);
-        for (name, series) in columns.channels {
-            match name {
-                "w" => w = series,
-                "u" => u = Some(series),
-                _ => v = Some(series),
-            }
+        let mapping = if is("toml") { Some(MastMapping::load(path)?) } else { None };
+        let file = mapping.as_ref().map_or(path, |mapping| &mapping.file);
+        if is_netcdf(file)? {
+            let raw = netcdf(file, mapping.as_ref(), near_m)?;
+            return Self::of(raw, file, mapping.as_ref());
         }
+        let mapping = match mapping {
+            Some(mapping) => mapping,
+            None => by_heads(path)?,
+        };
+        Self::of(table(&mapping)?, &mapping.file, Some(&mapping))
+    }
+
+    fn of(raw: Raw, file: &Path, mapping: Option<&MastMapping>) -> Result<Self, MastError> {
+        let broken = |reason: String| MastError::Record { path: file.to_owned(), reason };
+        let Raw { zero_ms, mut w, mut w_variance, mut wind, mut notes, .. } = raw;
         let steps = w.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let step_s = median(steps).unwrap_or(f64::INFINITY);
-        if step_s > SLOWEST_S {
-            return Err(broken(format!(
-                "its values are {step_s:.0} s apart, and drones are compared by means over 10 s: give a record with a \
-                 value at least every {SLOWEST_S:.0} s"
-            )));
+        let mean_s = raw.mean_s.unwrap_or(step_s);
+        let slow_s = (mean_s.max(step_s) > SLOWEST_S).then_some(mean_s);
+        if let Some(mean_s) = slow_s {
+            if mean_s > LONGEST_S {
+                return Err(broken(format!(
+                    "its values are {mean_s:.0} s apart: give one with means over {LONGEST_S:.0} s or less"
+                )));
+            }
+            if raw.is_point {
+                return Err(broken(format!(
+                    "its values are single samples {step_s:.0} s apart (cell_methods \"time: point\"), which tell no mean: give \
+                     means, or a record with a value at least every {SLOWEST_S:.0} s"
+                )));
+            }
         }
-        if mapping.latitude_deg.is_none() {
+        let said = mapping.and_then(|mapping| mapping.stamp);
+        let later_s = match (said.or(raw.stamp), slow_s) {
+            (Some(Stamp::Start), _) => 0.5 * mean_s,
+            (Some(Stamp::Middle), _) | (None, None) => 0.0,
+            (Some(Stamp::End), _) => -0.5 * mean_s,
+            (None, Some(mean_s)) => {
+                notes.push(format!(
+                    "values of the mast are {mean_s:.0} s apart: they are taken as means over the {mean_s:.0} s that end at \
+                     their times, as loggers write them; stamp = \"start\" or \"middle\" in a mapping says otherwise"
+                ));
+                -0.5 * mean_s
+            }
+        };
+        if mean_s.is_finite() && later_s != 0.0 {
+            let all =
+                std::iter::once(&mut w).chain(&mut w_variance).chain(wind.iter_mut().flatten());
+            for series in all {
+                series.time_s.iter_mut().for_each(|time| *time += later_s);
+            }
+        }
+        if let Some(mean_s) = slow_s {
+            notes.push(format!(
+                "the mast tells means over {mean_s:.0} s: spectra, coherence and gusts are not compared{}",
+                if w_variance.is_some() {
+                    ""
+                } else {
+                    ", nor variances, for which it would need a column w_variance or w_sd"
+                }
+            ));
+        }
+        let place_deg = mapping
+            .and_then(|mapping| mapping.latitude_deg.zip(mapping.longitude_deg))
+            .map(<[f64; 2]>::from)
+            .or(raw.place_deg);
+        if place_deg.is_none() {
             notes.push("the mast's place is not known: distances are not told".to_owned());
         }
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         Ok(Self {
-            name: mapping.name,
-            file: mapping.file,
-            place_deg: mapping.latitude_deg.zip(mapping.longitude_deg).map(<[f64; 2]>::from),
-            height_m: mapping.height_m,
-            zero_ms: start.to_unix_ms(),
+            name: mapping.map_or_else(|| stem.into_owned(), |mapping| mapping.name.clone()),
+            file: file.to_owned(),
+            place_deg,
+            height_m: raw.height_m.or(mapping.and_then(|mapping| mapping.height_m)),
+            zero_ms,
             step_s,
+            slow_s,
             w,
-            wind: u.zip(v).map(<[Series; 2]>::from),
+            w_variance,
+            wind,
             notes,
         })
     }
@@ -97,6 +158,58 @@ impl MastRecord {
         let enough = (COVERED * length_s / self.step_s).max(1.0);
         (values.len() as f64 >= enough).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
+}
+
+/// Whether a file is NetCDF, by its first bytes; the name counts where it has none.
+fn is_netcdf(path: &Path) -> Result<bool, MastError> {
+    let failed = |error| FileError::new("read", path, error);
+    let mut head = Vec::new();
+    open_named(path).map_err(failed)?.take(4).read_to_end(&mut head).map_err(failed)?;
+    let named = path.extension().is_some_and(|own| {
+        ["nc", "nc4", "cdf", "netcdf"].iter().any(|end| own.eq_ignore_ascii_case(end))
+    });
+    Ok(named || MAGIC.iter().any(|magic| head.starts_with(magic)))
+}
+
+#[cfg(feature = "netcdf-input")]
+use super::netcdf::read as netcdf;
+
+#[cfg(not(feature = "netcdf-input"))]
+fn netcdf(
+    path: &Path,
+    _mapping: Option<&MastMapping>,
+    _near_m: Option<f64>,
+) -> Result<Raw, MastError> {
+    Err(MastError::Record {
+        path: path.to_owned(),
+        reason: "this program was built without a reader of NetCDF: build it with the feature \"netcdf-input\", which is \
+                 on by default, or give a table (docs/mast.md)"
+            .to_owned(),
+    })
+}
+
+/// Reads a table.
+fn table(mapping: &MastMapping) -> Result<Raw, MastError> {
+    let columns = read_columns(&mapping.file, &mapping.wish()?)?;
+    let broken =
+        |reason: &str| MastError::Record { path: mapping.file.clone(), reason: reason.to_owned() };
+    let start = columns.start.ok_or_else(|| broken("its times are no dates"))?;
+    let mut raw = Raw { zero_ms: start.to_unix_ms(), notes: columns.warnings, ..Raw::default() };
+    let (mut u, mut v) = (None, None);
+    for (name, mut series) in columns.channels {
+        match name {
+            "w" => raw.w = series,
+            "u" => u = Some(series),
+            "v" => v = Some(series),
+            "w_variance" => raw.w_variance = Some(series),
+            _ => {
+                series.value.iter_mut().for_each(|sd| *sd = sd.powi(2));
+                raw.w_variance = Some(series);
+            }
+        }
+    }
+    raw.wind = u.zip(v).map(<[Series; 2]>::from);
+    Ok(raw)
 }
 
 /// The description of a table by the names of its columns.

@@ -24,6 +24,9 @@ pub struct MastComparison {
     pub mast_height_m: Option<f64>,
     /// Distance between its values, s.
     pub mast_step_s: f64,
+    /// Duration of the means that its values are, s, where it is slow and compared in these; absent: in means over 10 s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast_mean_s: Option<f64>,
     /// Flights that were compared.
     pub flights: Vec<MastFlight>,
     /// Flights that could not be compared, with the reason, and doubts.
@@ -37,16 +40,25 @@ pub struct MastFlight {
     pub flight: String,
     /// Times of the first and the last second that both have, UTC, ms since 1970.
     pub span_ms: [i64; 2],
+    /// Time over which both are averaged, s: 10, or the means of a slow mast.
+    pub mean_s: f64,
     /// Mean of all drones against the mast.
     pub fleet: Matched,
     /// Each drone against the mast, the nearest first.
     pub drones: Vec<MastDrone>,
     /// The fleet's mean against the mast in longer averages.
     pub averages: Vec<Average>,
+    /// Means of a slow mast within the flight.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub periods: Vec<MastPeriod>,
+    /// Variances of w within these means; absent: the mast does not tell them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_variance: Option<PeriodVariance>,
     /// Variance of the mast's ten-second means over the flight, (m/s)².
     pub mast_variance: Option<Moment>,
-    /// Variance of all of the mast's values over the flight, (m/s)²: with what ten-second means lose.
-    pub mast_variance_all: f64,
+    /// Variance of all of the mast's values over the flight, (m/s)²: with what ten-second means lose; absent of slow
+    /// means.
+    pub mast_variance_all: Option<f64>,
     /// Mean variance of the drones' ten-second means, without their noise, (m/s)².
     pub drone_variance: Option<Moment>,
     /// Spectrum of the mast's ten-second means.
@@ -65,12 +77,44 @@ pub struct MastFlight {
     pub series: MastSeries,
 }
 
+/// A mean of a slow mast beside the same seconds of the drones.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MastPeriod {
+    /// Time of its middle, UTC, ms since 1970.
+    pub middle_ms: i64,
+    /// Mast, m/s.
+    pub mast_mps: f64,
+    /// Mean of the drones, m/s.
+    pub fleet_mps: f64,
+    /// Nearest drone, m/s.
+    pub nearest_mps: Option<f64>,
+    /// Variance of w within the mean by the mast, (m/s)².
+    pub mast_variance: Option<f64>,
+    /// The same at a drone, mean of the drones, without their noise, (m/s)².
+    pub drone_variance: Option<f64>,
+}
+
+/// Variances of w within the means of a slow mast.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PeriodVariance {
+    /// Number of means.
+    pub count: usize,
+    /// Mean of the mast's variances, (m/s)².
+    pub mast: f64,
+    /// Mean of the drones', (m/s)².
+    pub drones: f64,
+    /// Standard error of the mean difference by its scatter; absent of fewer than three.
+    pub difference_se: Option<f64>,
+    /// Whether the drones' has the eddies alone that means over ten seconds have: a part of the mast's.
+    pub is_slow_part: bool,
+}
+
 /// Ten-second means at the seconds that both have.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MastSeries {
     /// Seconds since the first one.
     pub time_s: Vec<f64>,
-    /// Mast, m/s; NaN: not known.
+    /// Mast, m/s; NaN: not known. A slow mast's mean stands in all of its seconds.
     pub mast: Vec<f64>,
     /// Mean of the drones, m/s; NaN: not known.
     pub fleet: Vec<f64>,
@@ -108,8 +152,9 @@ pub struct Matched {
     pub mast_mean_mps: f64,
     /// Mean difference, drones less mast, m/s.
     pub bias_mps: f64,
-    /// Standard error of that mean by the differences themselves, their correlation counted, m/s: of sampling alone.
-    pub bias_se_mps: f64,
+    /// Standard error of that mean by the differences themselves, their correlation counted, m/s: of sampling alone. Absent
+    /// of fewer than three.
+    pub bias_se_mps: Option<f64>,
     /// Standard error of the drones' mean as they state it, m/s.
     pub stated_se_mps: Option<f64>,
     /// Root mean square difference, m/s.

@@ -13,6 +13,7 @@ pub mod kml;
 #[cfg(feature = "netcdf")]
 pub mod netcdf;
 mod on_map;
+pub mod thermals;
 pub mod turbulence;
 mod where_when;
 mod words;

@@ -37,7 +37,7 @@ pub const COHERENCE: [&str; 6] =
     ["flight", "distance_m", "pairs", "frequency_hz", "squared_coherence", "one_pair_from"];
 
 /// Half the width of a normal 95 % interval, standard errors.
-const NORMAL: f64 = 1.96;
+pub(super) const NORMAL: f64 = 1.96;
 
 /// A table of turbulence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +94,7 @@ pub fn write_csv(analysis: &Analysis, table: Table, out: &mut dyn io::Write) -> 
     for (flight, id) in analysis.flights.iter().zip(ids(analysis)) {
         let Some(turbulence) = &flight.turbulence else { continue };
         match table {
-            Table::Quantities => quantities(&mut text, &id, turbulence),
+            Table::Quantities => written(&mut text, &id, turbulence),
             Table::Spectra => spectra(&mut text, &id, turbulence),
             Table::Pairs => pairs(&mut text, &id, turbulence),
             Table::Coherence => coherence(&mut text, &id, turbulence),
@@ -126,36 +126,40 @@ fn whose(text: &mut String, flight: &str, drone: Option<(Option<u16>, &str)>) {
     }
 }
 
-/// Rows of quantities.
+/// A quantity with its 95 % interval.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Quantity {
+    /// Number of the drone; `None`: the fleet.
+    pub(super) drone: Option<usize>,
+    pub(super) name: String,
+    pub(super) unit: &'static str,
+    /// Value and ends of the interval, where they are known.
+    pub(super) of: [Option<f64>; 3],
+}
+
+/// Quantities of the fleet or of a drone.
 struct Rows<'a> {
-    text: &'a mut String,
-    flight: &'a str,
-    drone: Option<(Option<u16>, &'a str)>,
+    all: &'a mut Vec<Quantity>,
+    drone: Option<usize>,
 }
 
 impl Rows<'_> {
-    fn row(&mut self, quantity: &str, unit: &str, of: [Option<f64>; 3]) {
-        if of[0].is_none() {
-            return;
+    fn row(&mut self, quantity: &str, unit: &'static str, of: [Option<f64>; 3]) {
+        if of[0].is_some() {
+            self.all.push(Quantity { drone: self.drone, name: quantity.to_owned(), unit, of });
         }
-        whose(self.text, self.flight, self.drone);
-        let _ = write!(self.text, ",{quantity},{unit}");
-        for one in of {
-            value(self.text, one);
-        }
-        self.text.push('\n');
     }
 
-    fn alone(&mut self, quantity: &str, unit: &str, one: Option<f64>) {
+    fn alone(&mut self, quantity: &str, unit: &'static str, one: Option<f64>) {
         self.row(quantity, unit, [one, None, None]);
     }
 
-    fn interval(&mut self, quantity: &str, unit: &str, of: Option<Interval>) {
+    fn interval(&mut self, quantity: &str, unit: &'static str, of: Option<Interval>) {
         let of = of.map(|of| [of.value, of.low, of.high].map(Some));
         self.row(quantity, unit, of.unwrap_or_default());
     }
 
-    fn moment(&mut self, quantity: &str, unit: &str, of: Option<Moment>) {
+    fn moment(&mut self, quantity: &str, unit: &'static str, of: Option<Moment>) {
         let of = of.map(|of| Interval { value: of.value, low: of.low, high: of.high });
         self.interval(quantity, unit, of);
     }
@@ -180,8 +184,10 @@ impl Rows<'_> {
     }
 }
 
-fn quantities(text: &mut String, flight: &str, found: &Turbulence) {
-    let mut rows = Rows { text, flight, drone: None };
+/// All quantities: those of the fleet, then those of each drone.
+pub(super) fn quantities(found: &Turbulence) -> Vec<Quantity> {
+    let mut all = Vec::new();
+    let mut rows = Rows { all: &mut all, drone: None };
     rows.alone("record_length", "s", Some(found.record.length_s));
     let around = |value: f64, se: f64| Interval {
         value,
@@ -192,6 +198,9 @@ fn quantities(text: &mut String, flight: &str, found: &Turbulence) {
     rows.interval("wind_that_carries", "m s-1", carried);
     rows.component("w", found.vertical.as_ref());
     rows.interval("updraft_fraction", "1", found.updraft_fraction);
+    let convective = found.convective;
+    rows.interval("convective_velocity", "m s-1", convective.map(|of| of.velocity_mps));
+    rows.alone("mixed_layer_depth", "m", convective.map(|of| of.mixed_layer_depth_m));
     rows.component("u", found.along.as_ref());
     rows.component("v", found.across.as_ref());
     rows.interval("kinetic_energy", "m2 s-2", found.kinetic_energy);
@@ -205,9 +214,8 @@ fn quantities(text: &mut String, flight: &str, found: &Turbulence) {
     rows.interval("spectral_slope", "1", found.dissipation.map(|of| around(of.slope, of.slope_se)));
     let pattern = found.advection.map(|of| around(of.speed_mps.value, of.speed_mps.se));
     rows.interval("advection_speed", "m s-1", pattern);
-    for drone in &found.drones {
-        let mut rows =
-            Rows { text: &mut *rows.text, flight, drone: Some((drone.slot, drone.name.as_str())) };
+    for (number, drone) in found.drones.iter().enumerate() {
+        let mut rows = Rows { all: &mut all, drone: Some(number) };
         rows.alone("record_length", "s", Some(drone.length_s));
         rows.moment("variance_w", "m2 s-2", drone.vertical);
         rows.interval("skewness_w", "1", drone.skewness);
@@ -216,6 +224,19 @@ fn quantities(text: &mut String, flight: &str, found: &Turbulence) {
         rows.interval("kinetic_energy", "m2 s-2", drone.kinetic_energy);
         rows.interval("covariance_uw", "m2 s-2", drone.flux_along);
         rows.interval("dissipation", "m2 s-3", drone.dissipation);
+    }
+    all
+}
+
+fn written(text: &mut String, flight: &str, found: &Turbulence) {
+    for one in quantities(found) {
+        let drone = one.drone.and_then(|number| found.drones.get(number));
+        whose(text, flight, drone.map(|drone| (drone.slot, drone.name.as_str())));
+        let _ = write!(text, ",{},{}", one.name, one.unit);
+        for of in one.of {
+            value(text, of);
+        }
+        text.push('\n');
     }
 }
 

@@ -29,6 +29,7 @@ pub fn render_mast(of: &MastComparison, provenance: &Provenance) -> Result<Repor
         flights,
         mast => clean(&of.mast),
         mast_height => of.mast_height_m.map_or_else(|| "not known".to_owned(), |m| format!("{} m", fixed(m, 1))),
+        mast_mean => of.mast_mean_s.map(|s| fixed(s, 0)),
         mast_step => fixed(of.mast_step_s, 2),
         notes => of.notes.iter().map(|note| clean(note)).collect::<Vec<_>>(),
         schema => clean(&of.schema),
@@ -48,25 +49,32 @@ pub(super) fn figures(of: &MastComparison, format: Format) -> Vec<(String, Strin
 fn tiles(flight: &MastFlight) -> Vec<Value> {
     let fleet = &flight.fleet;
     let tile = |label: &str, value: String, note: String| context! { label, value, note };
-    let ratio = flight
-        .drone_variance
-        .as_ref()
-        .zip(flight.mast_variance.as_ref())
-        .filter(|(_, mast)| mast.value > 0.0)
-        .map_or_else(|| NONE.to_owned(), |(drones, mast)| fixed(drones.value / mast.value, 2));
+    let of_means = flight.drone_variance.as_ref().zip(flight.mast_variance.as_ref());
+    let of_periods = flight.period_variance.map(|of| (of.drones, of.mast));
+    let ratio = of_means
+        .map(|(drones, mast)| (drones.value, mast.value))
+        .or(of_periods)
+        .filter(|(_, mast)| *mast > 0.0)
+        .map_or_else(|| NONE.to_owned(), |(drones, mast)| fixed(drones / mast, 2));
+    let means = words::means(flight);
+    let within =
+        if flight.period_variance.is_some() { "within ".to_owned() } else { String::new() };
     vec![
         tile(
             "bias, m/s",
             signed(fleet.bias_mps, 2),
-            format!("± {} of sampling", fixed(fleet.bias_se_mps, 2)),
+            fleet.bias_se_mps.map_or_else(
+                || format!("of {} alone", words::means_in(flight)),
+                |se| format!("± {} of sampling", fixed(se, 2)),
+            ),
         ),
-        tile("rms difference, m/s", fixed(fleet.rms_mps, 2), "fleet's ten-second means".to_owned()),
+        tile("rms difference, m/s", fixed(fleet.rms_mps, 2), format!("fleet's {means}")),
         tile(
             "correlation",
             fleet.correlation.map_or_else(|| NONE.to_owned(), |r| signed(r, 2)),
-            "fleet's ten-second means".to_owned(),
+            format!("fleet's {means}"),
         ),
-        tile("variance, drones over mast", ratio, "ten-second means".to_owned()),
+        tile("variance, drones over mast", ratio, format!("{within}{means}")),
     ]
 }
 
@@ -88,6 +96,8 @@ fn section(flight: &MastFlight, files: &mut Vec<(String, String)>) -> Value {
         when => words::when(flight),
         sentences => words::sentences(flight),
         figures => shown,
+        period_heads => words::PERIOD_HEADS,
+        periods => words::periods(flight),
         average_heads => words::AVERAGE_HEADS,
         averages => words::averages(flight),
         drone_heads => words::DRONE_HEADS,

@@ -12,6 +12,9 @@ use super::text::clean;
 /// Of more drones, the nearest are shown; all are on the page.
 const DRONE_LIMIT: usize = 12;
 
+/// More means of a slow mast are on the page alone.
+const PERIOD_LIMIT: usize = 20;
+
 /// Renders a comparison with a mast for a terminal of `width` characters.
 pub fn mast_summary(of: &MastComparison, width: usize) -> String {
     let mut text = format!("{}\n", words::title(of));
@@ -27,10 +30,14 @@ pub fn mast_summary(of: &MastComparison, width: usize) -> String {
             wrapped(&mut text, "  ", &sentence);
         }
         let drones = flight.drones.iter().take(DRONE_LIMIT).map(words::drone).collect::<Vec<_>>();
-        for (heads, rows) in [
+        let mut tables = vec![
             (columns(&words::AVERAGE_HEADS), words::averages(flight)),
             (columns(&words::DRONE_HEADS), drones),
-        ] {
+        ];
+        if !flight.periods.is_empty() && flight.periods.len() <= PERIOD_LIMIT {
+            tables.insert(0, (columns(&words::PERIOD_HEADS), words::periods(flight)));
+        }
+        for (heads, rows) in tables {
             let _ = writeln!(text);
             for line in lines(&heads, &rows, width.saturating_sub(2)) {
                 let _ = writeln!(text, "  {line}");

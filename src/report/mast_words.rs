@@ -3,7 +3,9 @@
 use turbulence_statistics::Moment;
 
 use crate::base::estimate::Estimate;
-use crate::mast::result::{Average, MastComparison, MastDrone, MastFlight, Matched};
+use crate::mast::result::{
+    Average, MastComparison, MastDrone, MastFlight, MastPeriod, Matched, PeriodVariance,
+};
 use crate::products::iso;
 
 use super::text::{NONE, clean, count, fixed, signed, signed_estimate};
@@ -15,39 +17,69 @@ pub(super) fn title(of: &MastComparison) -> String {
     format!("{} against {}", clean(campaign), clean(mast))
 }
 
+/// Means that are compared.
+pub(super) fn means(flight: &MastFlight) -> String {
+    if flight.periods.is_empty() {
+        "ten-second means".to_owned()
+    } else {
+        format!("means over {} s", fixed(flight.mean_s, 0))
+    }
+}
+
+/// Number of means that are compared.
+pub(super) fn means_in(flight: &MastFlight) -> String {
+    count(flight.fleet.count, if flight.periods.is_empty() { "second" } else { "mean" })
+}
+
+/// A mean difference with the error of its sampling, if that is known.
+fn bias(of: &Matched) -> String {
+    of.bias_se_mps.map_or_else(
+        || signed(of.bias_mps, 2),
+        |se| signed_estimate(Estimate::new(of.bias_mps, se)),
+    )
+}
+
 /// When a flight was, and what it is compared with.
 pub(super) fn when(flight: &MastFlight) -> String {
     let [from, to] = flight.span_ms.map(iso);
     let (day, from) = from.split_once('T').unwrap_or(("", &from));
     let to = to.split_once('T').map_or(to.as_str(), |(_, to)| to);
     let short = |time: &str| time.split('.').next().unwrap_or_default().to_owned();
+    let what = if flight.periods.is_empty() {
+        format!("{} in {}", means(flight), count(flight.fleet.count, "common second"))
+    } else {
+        format!("{} common {}", flight.fleet.count, means(flight))
+    };
     format!(
-        "{day} {} to {} UTC, {}, ten-second means in {}",
+        "{day} {} to {} UTC, {}, {what}",
         short(from),
         short(to),
         count(flight.drones.len(), "drone"),
-        count(flight.fleet.count, "common second")
     )
 }
 
 /// What was found, a sentence each.
 pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
     let fleet = &flight.fleet;
-    let bias = Estimate::new(fleet.bias_mps, fleet.bias_se_mps);
-    let stated = match fleet.stated_se_mps {
-        Some(se) => {
-            let beyond = fleet.bias_mps.abs() > 1.96 * se.hypot(fleet.bias_se_mps);
+    let stated = match (fleet.stated_se_mps, fleet.bias_se_mps) {
+        (Some(se), sampling) => {
+            let beyond = fleet.bias_mps.abs() > 1.96 * se.hypot(sampling.unwrap_or(0.0));
             let within = if beyond { "more than that" } else { "within that" };
             format!(
                 ", and state a standard error of {} m/s for it: the bias is {within} (95 %)",
                 fixed(se, 2)
             )
         }
-        None => String::new(),
+        _ => String::new(),
+    };
+    let sampled = match fleet.bias_se_mps {
+        Some(_) if flight.periods.is_empty() => " (± is the sampling of these seconds)".to_owned(),
+        Some(_) => format!(" (± is the sampling of these {})", means(flight)),
+        None => format!(" (in {}, too few to tell their scatter)", means_in(flight)),
     };
     let mut all = vec![format!(
-        "In the mean the drones say {} m/s more than the mast (± is the sampling of these seconds){stated}.",
-        signed_estimate(bias)
+        "In the mean the drones say {} m/s more than the mast{sampled}{stated}.",
+        bias(fleet)
     )];
     let follows = match (fleet.correlation, fleet.slope) {
         (Some(r), Some(slope)) => {
@@ -61,13 +93,17 @@ pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
         fixed(fleet.sd_mps, 2)
     ));
     if let (Some(drones), Some(mast)) = (&flight.drone_variance, &flight.mast_variance) {
+        let as_they_are = flight.mast_variance_all.map_or_else(String::new, |all| {
+            format!(", whose values as they are have {} (m/s)²", fixed(all, 3))
+        });
         all.push(format!(
-            "Variance of ten-second means: {} (m/s)² by the drones, {} (m/s)² by the mast, whose values as they are have \
-             {} (m/s)².",
+            "Variance of ten-second means: {} (m/s)² by the drones, {} (m/s)² by the mast{as_they_are}.",
             variance(drones),
             variance(mast),
-            fixed(flight.mast_variance_all, 3)
         ));
+    }
+    if let Some(of) = &flight.period_variance {
+        all.push(period_variance(of, flight));
     }
     if let Some([shift_s, correlation]) = flight.best_shift {
         let better = fleet.correlation.is_none_or(|now| correlation > now + 0.02);
@@ -75,9 +111,10 @@ pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
             let which = if shift_s > 0.0 { "later" } else { "earlier" };
             all.push(format!(
                 "The records agree best with the drones {} s {which} than the mast (correlation {}): air that is carried \
-                 from one to the other, or clocks that differ.",
+                 from one to the other, or clocks that differ{}.",
                 fixed(shift_s.abs(), 0),
-                signed(correlation, 2)
+                signed(correlation, 2),
+                if flight.periods.is_empty() { "" } else { ", or times of the mast that mark another end of its means" }
             ));
         }
     }
@@ -85,13 +122,62 @@ pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
         all.push(format!(
             "Wind by the drones' leans less the mast's: {} m/s towards east and {} m/s towards north; root mean square {} \
              and {} m/s.",
-            signed_estimate(Estimate::new(east.bias_mps, east.bias_se_mps)),
-            signed_estimate(Estimate::new(north.bias_mps, north.bias_se_mps)),
+            bias(east),
+            bias(north),
             fixed(east.rms_mps, 2),
             fixed(north.rms_mps, 2)
         ));
     }
     all
+}
+
+/// Variances within the means of a slow mast.
+fn period_variance(of: &PeriodVariance, flight: &MastFlight) -> String {
+    let error = of.difference_se.map_or_else(String::new, |se| {
+        format!(", difference {}", signed_estimate(Estimate::new(of.drones - of.mast, se)))
+    });
+    let part = if of.is_slow_part {
+        "; the drones' is that of their ten-second means alone, which lack the faster eddies"
+    } else {
+        ""
+    };
+    format!(
+        "Variance of w within {}, mean of {}: {} (m/s)² by the drones, {} (m/s)² by the mast{error}{part}.",
+        means(flight),
+        of.count,
+        fixed(of.drones, 3),
+        fixed(of.mast, 3)
+    )
+}
+
+/// Heads of the table of a slow mast's means.
+pub(super) const PERIOD_HEADS: [&str; 6] = [
+    "middle, UTC",
+    "mast, m/s",
+    "drones, m/s",
+    "nearest, m/s",
+    "var(w) mast, (m/s)²",
+    "var(w) drones, (m/s)²",
+];
+
+/// Rows of that table.
+pub(super) fn periods(flight: &MastFlight) -> Vec<Vec<String>> {
+    let known = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(|| NONE.to_owned(), |value| fixed(value, decimals))
+    };
+    let row = |of: &MastPeriod| {
+        let middle = iso(of.middle_ms);
+        let time = middle.split_once('T').map_or(middle.as_str(), |(_, time)| time);
+        vec![
+            time.split('.').next().unwrap_or_default().trim_end_matches('Z').to_owned(),
+            signed(of.mast_mps, 2),
+            signed(of.fleet_mps, 2),
+            of.nearest_mps.map_or_else(|| NONE.to_owned(), |w| signed(w, 2)),
+            known(of.mast_variance, 3),
+            known(of.drone_variance.filter(|_| of.mast_variance.is_some()), 3),
+        ]
+    };
+    flight.periods.iter().map(row).collect()
 }
 
 /// A variance with its 95 % interval.
@@ -111,14 +197,12 @@ pub(super) const AVERAGE_HEADS: [&str; 8] = [
     "correlation, nearest",
 ];
 
-/// Rows of the table of averages; the first is that of ten seconds.
+/// Rows of the table of averages; the first is that of the means that are compared.
 pub(super) fn averages(flight: &MastFlight) -> Vec<Vec<String>> {
     let nearest = flight.drones.first().map(|drone| drone.matched);
-    let first = nearest.map(|nearest| Average { length_s: 10.0, fleet: flight.fleet, nearest });
-    let cells = |of: &Matched| {
-        let bias = signed_estimate(Estimate::new(of.bias_mps, of.bias_se_mps));
-        [bias, fixed(of.rms_mps, 2), correlation(of)]
-    };
+    let first =
+        nearest.map(|nearest| Average { length_s: flight.mean_s, fleet: flight.fleet, nearest });
+    let cells = |of: &Matched| [bias(of), fixed(of.rms_mps, 2), correlation(of)];
     first
         .iter()
         .chain(&flight.averages)
@@ -151,7 +235,7 @@ pub(super) fn drone(of: &MastDrone) -> Vec<String> {
         clean(&of.drone),
         known(of.distance_m, 0),
         known(of.above_m, 0),
-        signed_estimate(Estimate::new(of.matched.bias_mps, of.matched.bias_se_mps)),
+        bias(&of.matched),
         known(of.matched.stated_se_mps, 2),
         fixed(of.matched.rms_mps, 2),
         correlation(&of.matched),

@@ -194,6 +194,15 @@ fn fleet_rows(found: &Turbulence) -> Vec<Value> {
         "",
         "share of time and drones above the drone's mean",
     );
+    if let Some(of) = &found.convective {
+        let note = format!(
+            "of a mixed layer of {} m, {} m up, by the profile of Lenschow and others (1980); its depth and its scatter are not \
+             in the interval",
+            fixed(of.mixed_layer_depth_m, 0),
+            fixed(of.height_m, 0)
+        );
+        interval("Convective velocity scale", "w*", &Some(of.velocity_mps), "m/s", &note);
+    }
     interval(
         "Turbulent kinetic energy",
         "e",

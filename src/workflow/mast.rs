@@ -11,6 +11,7 @@ use super::made_by;
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
 use crate::campaign::to_json;
+use crate::mast::make::drones_height_m;
 use crate::mast::{MastComparison, MastError, MastRecord, compare};
 use crate::report::{self, InputFile, Provenance};
 
@@ -41,7 +42,8 @@ pub fn run(
         refuse_output(output)?;
     }
     let read = AnalysisFile::read(campaign)?;
-    let record = MastRecord::read(mast).map_err(failed)?;
+    let near_m = drones_height_m(&read.analysis);
+    let record = MastRecord::read(mast, near_m).map_err(failed)?;
     let comparison = compare(&read.analysis, campaign, &record, &made_by()).map_err(failed)?;
     for note in &comparison.notes {
         host.warn(note);

@@ -31,6 +31,10 @@ pub(super) fn of_report(root: &Path, folder: &Path, analysis: &Analysis) -> Vec<
     }
     links.extend(netcdf(folder, analysis));
     links.extend(turbulence(folder, analysis));
+    if products::thermals::any(analysis) {
+        let path = campaign::fields_thermals(folder);
+        links.push(PageLink::there("Thermals over time, as a table", relative(folder, &path)));
+    }
     if products::has_map(analysis) {
         for (title, path) in [
             ("The drones on a map, for Google Earth (KML)", campaign::fields_kml(folder)),
@@ -116,7 +120,16 @@ fn netcdf(folder: &Path, analysis: &Analysis) -> Vec<PageLink> {
         let path = campaign::fields_grid_netcdf(folder, (!single).then_some(flight));
         (format!("The posterior between the drones{named}"), path)
     });
-    let files = drones.into_iter().chain(grids);
+    let hovers = products::netcdf::expected_turbulence(analysis);
+    let hovers: Vec<(String, _)> = hovers
+        .iter()
+        .map(|flight| {
+            let named = if hovers.len() == 1 { String::new() } else { format!(", {flight}") };
+            let name = (hovers.len() > 1).then_some(flight.as_str());
+            (format!("Turbulence{named}"), campaign::fields_turbulence_netcdf(folder, name))
+        })
+        .collect();
+    let files = drones.into_iter().chain(grids).chain(hovers);
     files
         .map(|(title, path)| {
             PageLink::there(&format!("{title}, as NetCDF (CF)"), relative(folder, &path))

@@ -17,8 +17,8 @@ use super::super::statistics::result::TiltWind;
 use super::pairs;
 use super::records::Records;
 use super::result::{
-    CarriedBy, CarriedByWhat, Component, DroneTurbulence, Interval, PatternSpeed, Scales,
-    Turbulence, TurbulenceRecord,
+    CarriedBy, CarriedByWhat, Component, Convective, DroneTurbulence, Interval, PatternSpeed,
+    Scales, Turbulence, TurbulenceRecord,
 };
 use super::scales::integral_time;
 use crate::base::estimate::Estimate;
@@ -56,6 +56,10 @@ pub(in crate::analysis) struct Asked<'a> {
     pub(in crate::analysis) wind: Option<&'a TiltWind>,
     /// Relative standard error of speeds by the lean.
     pub(in crate::analysis) drag_share: Option<f64>,
+    /// Mean height of the drones above the ground, m.
+    pub(in crate::analysis) height_m: Option<f64>,
+    /// Depth of the mixed layer, m, if somebody knows it.
+    pub(in crate::analysis) mixed_layer_depth_m: Option<f64>,
 }
 
 /// A drone with its records.
@@ -80,6 +84,26 @@ struct Common {
     step_s: f64,
     length_s: f64,
     wind: Option<Estimate>,
+}
+
+/// The convective velocity scale, where somebody knows the depth of the mixed layer and the record tells the variance of w.
+fn convective(found: &mut Turbulence, asked: Asked<'_>) -> Option<Convective> {
+    let depth_m = asked.mixed_layer_depth_m?;
+    let variance = found.vertical.as_ref().and_then(|of| of.variance);
+    let Some((variance, height_m)) = variance.zip(asked.height_m) else {
+        found.absent.push(
+            "no convective velocity scale: it needs the variance of w, which is not told"
+                .to_owned(),
+        );
+        return None;
+    };
+    let made = Convective::of(&variance, height_m, depth_m);
+    if made.is_none() {
+        found.absent.push(format!(
+            "no convective velocity scale: the drones at {height_m:.0} m are not within the mixed layer of {depth_m:.0} m"
+        ));
+    }
+    made
 }
 
 /// Turbulence of a fleet; `None` where no drone has a record.
@@ -125,6 +149,7 @@ pub(in crate::analysis) fn of_fleet(drones: &[Drone<'_>], asked: Asked<'_>) -> O
     advect(&mut found, drones, &aligned, asked);
     let common = Common { step_s, length_s, wind: found.carried_by.map(|wind| wind.speed_mps) };
     vertical(&mut found, drones, &aligned, &common);
+    found.convective = convective(&mut found, asked);
     horizontal(&mut found, drones, &aligned, &common, asked);
     each(&mut found, drones, &aligned, &common, asked);
     Some(found)

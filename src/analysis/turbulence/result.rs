@@ -32,6 +32,9 @@ pub struct Turbulence {
     /// error of the zero touches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub updraft_fraction: Option<Interval>,
+    /// Convective velocity scale; absent: nobody said how deep the mixed layer is, or the variance of w is not told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convective: Option<Convective>,
     /// Turbulent kinetic energy, half the sum of the three variances, m²/s².
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kinetic_energy: Option<Interval>,
@@ -132,6 +135,34 @@ pub struct Component {
     pub scale_se: f64,
     /// Mean spectrum over the drones, corrected for response and noise.
     pub spectrum: Vec<Band>,
+}
+
+/// Convective velocity scale from the variance of w, by the profile of Lenschow, Wyngaard and Pennell (1980):
+/// `σw² = 1.8 w*² (z/zi)^(2/3) (1 - 0.8 z/zi)²`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Convective {
+    /// The scale w*, m/s; its interval is that of the variance alone.
+    pub velocity_mps: Interval,
+    /// Depth of the mixed layer that was given, zi, m.
+    pub mixed_layer_depth_m: f64,
+    /// Mean height of the drones, z, m.
+    pub height_m: f64,
+}
+
+impl Convective {
+    /// The scale of a variance of w at a height in a mixed layer; `None`: the height is not within it.
+    pub fn of(variance: &Moment, height_m: f64, depth_m: f64) -> Option<Self> {
+        let share = height_m / depth_m;
+        let within = share > 0.0 && share < 1.0;
+        let profile = 1.8 * share.powf(2.0 / 3.0) * (1.0 - 0.8 * share).powi(2);
+        let scale = |variance: f64| (variance.max(0.0) / profile).sqrt();
+        let velocity_mps = Interval {
+            value: scale(variance.value),
+            low: scale(variance.low),
+            high: scale(variance.high),
+        };
+        within.then_some(Self { velocity_mps, mixed_layer_depth_m: depth_m, height_m })
+    }
 }
 
 /// Integral scales of a component.
@@ -241,4 +272,30 @@ pub struct DroneTurbulence {
     pub dissipation: Option<Interval>,
     /// Spectrum of w.
     pub spectrum: Vec<Band>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_convective_scale_gives_the_variance_back() {
+        // Lenschow's profile is highest, at 0.44 w*², about a quarter of the layer up.
+        let variance = 1.8 * 0.25_f64.powf(2.0 / 3.0) * 0.64 * 4.0;
+        let moment = Moment {
+            value: variance,
+            low: 0.81 * variance,
+            high: 1.44 * variance,
+            random: 0.0,
+            systematic: 0.0,
+            time_s: 0.0,
+        };
+        let found = Convective::of(&moment, 300.0, 1200.0).unwrap();
+        let Interval { value, low, high } = found.velocity_mps;
+        assert!((value - 2.0).abs() < 1e-12, "{value}");
+        assert!((low - 1.8).abs() < 1e-12 && (high - 2.4).abs() < 1e-12, "{low} {high}");
+        for height_m in [1200.0, 1300.0, 0.0, -1.0, f64::NAN] {
+            assert!(Convective::of(&moment, height_m, 1200.0).is_none(), "{height_m}");
+        }
+    }
 }

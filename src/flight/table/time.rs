@@ -2,7 +2,7 @@
 
 /// Seconds since 1970 of `2021-04-20 09:29:26.100` (with a blank or a T, perhaps a Z at the end); the
 /// proleptic Gregorian calendar without leap seconds. `None`: it is none.
-pub(super) fn seconds_of(text: &str) -> Option<f64> {
+pub(crate) fn seconds_of(text: &str) -> Option<f64> {
     let text = text.trim().trim_end_matches('Z');
     let (date, time) = text.split_once([' ', 'T'])?;
     let [year, month, day] = three(date, '-')?;

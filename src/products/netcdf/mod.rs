@@ -1,5 +1,6 @@
 //! The measured fields as NetCDF by the CF conventions 1.11: a file of all drones (discrete sampling geometry, trajectories
-//! as contiguous ragged arrays), and for each flight with a posterior between its drones a file of that grid.
+//! as contiguous ragged arrays), and for each flight with a posterior between its drones a file of that grid,
+//! and for each hover with turbulence one of that.
 //!
 //! Both need UTC and a place on the globe, which are coordinates there: what has neither is left out, and said.
 
@@ -8,6 +9,7 @@ mod globals;
 mod grid;
 mod speeds;
 mod trajectories;
+mod turbulence;
 
 use thiserror::Error;
 
@@ -36,6 +38,8 @@ pub struct Files {
     pub drones: Option<Vec<u8>>,
     /// Flights with a posterior between their drones: name of the flight, file.
     pub grids: Vec<(String, Vec<u8>)>,
+    /// Flights with turbulence: name of the flight, file.
+    pub turbulence: Vec<(String, Vec<u8>)>,
     /// Sentences about the parts that are left out, with the reason.
     pub left_out: Vec<String>,
 }
@@ -49,6 +53,12 @@ pub fn expected(analysis: &Analysis) -> (bool, Vec<String>) {
     (super::fields::rows(analysis).any(placed), grids.collect())
 }
 
+/// Flights that will have a file of their turbulence.
+pub fn expected_turbulence(analysis: &Analysis) -> Vec<String> {
+    let flights = analysis.flights.iter().zip(super::fields::ids(analysis));
+    flights.filter(|(flight, _)| turbulence::is_placed(flight)).map(|(_, id)| id).collect()
+}
+
 /// Makes the files.
 ///
 /// # Errors
@@ -60,9 +70,14 @@ pub fn files(analysis: &Analysis, origin: &Origin, format: Format) -> Result<Fil
     files.left_out.extend(left_out);
     for (flight, id) in analysis.flights.iter().zip(super::fields::ids(analysis)) {
         match grid::file((flight, &id), analysis, origin, format)? {
-            grid::Made::File(bytes) => files.grids.push((id, bytes)),
+            grid::Made::File(bytes) => files.grids.push((id.clone(), bytes)),
             grid::Made::Unplaced(lacks) => files.left_out.push(lacks),
             grid::Made::Nothing => {}
+        }
+        match turbulence::file((flight, &id), analysis, origin, format)? {
+            turbulence::Made::File(bytes) => files.turbulence.push((id, bytes)),
+            turbulence::Made::Unplaced(lacks) => files.left_out.push(lacks),
+            turbulence::Made::Nothing => {}
         }
     }
     Ok(files)

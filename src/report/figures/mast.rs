@@ -4,7 +4,7 @@ use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
 use crate::mast::matched::averages;
-use crate::mast::result::MastFlight;
+use crate::mast::result::{MastFlight, MastPeriod};
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
@@ -39,7 +39,13 @@ fn over_time(flight: &MastFlight, key: &str, format: Format) -> Figure {
     };
     let reach = series.mast.iter().chain(&series.fleet).chain(&series.nearest).copied();
     let y = Axis::around("vertical air speed (m/s)", reach.filter(|value| usable(*value)), 0.5);
-    let mut panel = Panel::new("(a) Ten-second means", x, y.clone());
+    let slow = !flight.periods.is_empty();
+    let head = if slow {
+        format!("(a) Ten-second means of the drones, {:.0} s of the mast", flight.mean_s)
+    } else {
+        "(a) Ten-second means".to_owned()
+    };
+    let mut panel = Panel::new(&head, x, y.clone());
     panel.legend_at(LegendPosition::InsideTopRight);
     let band: Vec<(f64, f64, f64)> = series
         .time_s
@@ -57,8 +63,13 @@ fn over_time(flight: &MastFlight, key: &str, format: Format) -> Figure {
         panel.line(&known(&series.time_s, &series.nearest), GREEN, 1.2, "4 3");
         panel.entry("nearest drone", GREEN, LegendShape::Line, "4 3");
     }
-    let [mast, fleet, nearest] =
-        [&series.mast, &series.fleet, &series.nearest].map(|values| averages(values, SCATTER_S));
+    let [mast, fleet, nearest] = if slow {
+        let of = |get: fn(&MastPeriod) -> f64| flight.periods.iter().map(get).collect();
+        let nearest = |one: &MastPeriod| one.nearest_mps.unwrap_or(f64::NAN);
+        [of(|one| one.mast_mps), of(|one| one.fleet_mps), of(nearest)]
+    } else {
+        [&series.mast, &series.fleet, &series.nearest].map(|values| averages(values, SCATTER_S))
+    };
     let ends = || mast.iter().chain(&fleet).chain(&nearest).copied().filter(|w| usable(*w));
     let x = Axis::around("mast (m/s)", ends(), 0.5);
     let y = Axis { label: "drones (m/s)".to_owned(), ..x.clone() };
@@ -82,9 +93,11 @@ fn over_time(flight: &MastFlight, key: &str, format: Format) -> Figure {
         name,
         title,
         caption: format!(
-            "(a) Running means over ten seconds of the vertical air speed; the band is the 95 % interval that the drones \
-             state, most of which is one shift of all. (b) Averages of {SCATTER_S} s against each other; on the dashed line \
-             they agree."
+            "(a) Running means over ten seconds of the vertical air speed{}; the band is the 95 % interval that the drones \
+             state, most of which is one shift of all. (b) Averages of {} s against each other; on the dashed line \
+             they agree.",
+            if slow { " by the drones, the mast's own means as steps" } else { "" },
+            if slow { format!("{:.0}", flight.mean_s) } else { SCATTER_S.to_string() },
         ),
     }
 }

@@ -9,7 +9,7 @@ use crate::analysis::result::Analysis;
 use crate::base::file::write_with;
 use crate::base::plain::Shown as _;
 use crate::campaign;
-use crate::products::{Origin, fields, fields_grid, geojson, kml, turbulence};
+use crate::products::{Origin, fields, fields_grid, geojson, kml, thermals, turbulence};
 use crate::report::Provenance;
 use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
 use crate::workflow::error::WorkflowError;
@@ -44,6 +44,12 @@ pub(super) fn write_fields(
         remove(&[csv, parquet]);
     }
     write_turbulence(analysis, folder)?;
+    let path = campaign::fields_thermals(folder);
+    if thermals::any(analysis) {
+        write_with(&path, |out| thermals::write_csv(analysis, out))?;
+    } else {
+        remove(&[path]);
+    }
     write_netcdf(host, (analysis, &origin), folder, wish)?;
     text(&campaign::fields_geojson(folder), geojson::geojson(analysis))?;
     text(&campaign::fields_kml(folder), kml::kml(analysis))
@@ -101,25 +107,41 @@ fn write_netcdf(
         Some(bytes) => write_whole(&drones, bytes)?,
         None => remove(&[drones]),
     }
-    let mut written: Vec<PathBuf> = Vec::new();
-    let single = made.grids.len() == 1;
-    for (number, (flight, bytes)) in made.grids.iter().enumerate() {
-        let name = (!single).then_some(flight.as_str());
-        let mut path = campaign::fields_grid_netcdf(folder, name);
-        if written.contains(&path) {
-            let numbered = format!("{flight}-{number}");
-            path = campaign::fields_grid_netcdf(folder, Some(&numbered));
-        }
-        write_whole(&path, bytes)?;
-        written.push(path);
-    }
-    let mut old = campaign::fields_grids_netcdf(folder);
-    old.retain(|path| !written.contains(path));
-    remove(&old);
+    let grids = one_each(&made.grids, |name| campaign::fields_grid_netcdf(folder, name))?;
+    remove_others(campaign::fields_grids_netcdf(folder), &grids);
+    let of_turbulence = |name: Option<&str>| campaign::fields_turbulence_netcdf(folder, name);
+    let turbulence = one_each(&made.turbulence, of_turbulence)?;
+    remove_others(campaign::fields_turbulences_netcdf(folder), &turbulence);
     for sentence in &made.left_out {
         host.say(sentence);
     }
     Ok(())
+}
+
+/// Writes a file for each flight; that of a single flight has no flight in its name.
+#[cfg(feature = "netcdf")]
+fn one_each(
+    files: &[(String, Vec<u8>)],
+    path: impl Fn(Option<&str>) -> PathBuf,
+) -> Result<Vec<PathBuf>, WorkflowError> {
+    let mut written: Vec<PathBuf> = Vec::new();
+    let single = files.len() == 1;
+    for (number, (flight, bytes)) in files.iter().enumerate() {
+        let mut own = path((!single).then_some(flight.as_str()));
+        if written.contains(&own) {
+            own = path(Some(&format!("{flight}-{number}")));
+        }
+        crate::base::file::write_whole(&own, bytes)?;
+        written.push(own);
+    }
+    Ok(written)
+}
+
+/// Removes files of an earlier analysis.
+#[cfg(feature = "netcdf")]
+fn remove_others(mut old: Vec<PathBuf>, written: &[PathBuf]) {
+    old.retain(|path| !written.contains(path));
+    remove(&old);
 }
 
 #[cfg(not(feature = "netcdf"))]
@@ -131,6 +153,7 @@ fn write_netcdf(
 ) -> Result<(), WorkflowError> {
     remove(&[campaign::fields_netcdf(folder)]);
     remove(&campaign::fields_grids_netcdf(folder));
+    remove(&campaign::fields_turbulences_netcdf(folder));
     Ok(())
 }
 

@@ -137,6 +137,7 @@ impl<'a> Analysing<'a> {
         );
         let mut analysis = analysis.map_err(|error| WorkflowError::Nothing(error.to_string()))?;
         outcome::refuse_level(&analysis)?;
+        outcome::refuse_depth(&analysis, settings.options.mixed_layer_depth_m)?;
         if settings.combine {
             analysis = with_others(host, work, settings, reference.as_ref(), analysis);
         }

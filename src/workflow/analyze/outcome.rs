@@ -27,6 +27,24 @@ pub(crate) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
     analysis.warnings.iter().map(ToString::to_string).chain(flights).collect()
 }
 
+/// Refuses a mixed layer that drones fly above.
+pub(super) fn refuse_depth(analysis: &Analysis, depth_m: Option<f64>) -> Result<(), WorkflowError> {
+    let Some(depth_m) = depth_m else { return Ok(()) };
+    let known = |flight: &&FlightAnalysis| flight.turbulence.is_some();
+    for flight in analysis.flights.iter().filter(known) {
+        let drones = flight.map.iter().flat_map(|map| &map.drones);
+        let highest_m = drones.map(|drone| drone.height_m).fold(f64::NEG_INFINITY, f64::max);
+        if highest_m >= depth_m {
+            return Err(WorkflowError::Usage(format!(
+                "--mixed-layer-depth {depth_m}: the drones of {} were {highest_m:.0} m above the ground, and the mixed layer \
+                 must reach above them; give its depth zi, from the ground to the inversion",
+                crate::base::plain::plain(&flight.name)
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a zero that no hover has, or a level that nothing gives: they were asked for.
 ///
 /// # Errors

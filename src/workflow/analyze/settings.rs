@@ -67,6 +67,8 @@ impl Settings {
             "trimmed means, weighted by their standard errors"
         };
         let corrected = |off: bool| if off { "not corrected" } else { "corrected" };
+        let depth =
+            options.mixed_layer_depth_m.map(|m| ("depth of the mixed layer", format!("{m} m")));
         [
             ("law of the map", law),
             ("tilt correction", tilt),
@@ -81,6 +83,8 @@ impl Settings {
             ),
         ]
         .map(|(what, how)| (what, how.to_owned()))
-        .into()
+        .into_iter()
+        .chain(depth)
+        .collect()
     }
 }

@@ -96,6 +96,11 @@ pub(crate) const RULES: &[Rule] = &[
     rule("docs/compare.md", "updraft compare", Read(TWO)),
     rule("docs/mast.md", "updraft compare", Read("needs a mast's record: tests/it/mast")),
     rule(
+        "docs/products.md",
+        "updraft analyze my-campaign --mixed-layer-depth",
+        Read("needs a campaign with a long hover: tests/it/turbulence"),
+    ),
+    rule(
         "docs/air.md",
         "updraft simulate my-campaign --flight hover --air les:",
         Read("needs the output of a model: tests/it/les makes one"),

@@ -2,6 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
 
+#[cfg(all(feature = "netcdf", feature = "netcdf-input"))]
+mod netcdf;
+mod slow;
+
 use std::fmt::Write as _;
 use std::fs;
 
@@ -35,6 +39,21 @@ fn analysed() -> Bench {
     bench
 }
 
+/// Values of the drone: seconds since 1970, UTC, and w, m/s.
+fn values(bench: &Bench) -> Vec<(f64, f64)> {
+    let analysis: Value =
+        serde_json::from_slice(&fs::read(bench.path("out/analysis.json")).unwrap()).unwrap();
+    let map = &analysis["flights"][1]["map"];
+    let start = &analysis["flights"][1]["drones"][0]["clock"]["start"];
+    // GPS time begins at 1980-01-06 and was 18 s ahead of UTC.
+    let zero_s =
+        number(&start["week"]) * 604_800.0 + number(&start["tow_ms"]) / 1000.0 + 315_964_800.0
+            - 18.0;
+    let times = map["time_s"].as_array().unwrap().iter();
+    let all = times.zip(map["drones"][0]["updraft_mps"].as_array().unwrap());
+    all.filter_map(|(time, value)| Some((zero_s + number(time), value.as_f64()?))).collect()
+}
+
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
@@ -66,20 +85,10 @@ fn a_real_drone_beside_a_real_mast() {
 #[test]
 fn a_known_mast_is_found_out() {
     let bench = analysed();
-    let analysis: Value =
-        serde_json::from_slice(&fs::read(bench.path("out/analysis.json")).unwrap()).unwrap();
-    let map = &analysis["flights"][1]["map"];
-    let start = &analysis["flights"][1]["drones"][0]["clock"]["start"];
-    // GPS time begins at 1980-01-06 and was 18 s ahead of UTC.
-    let zero_s =
-        number(&start["week"]) * 604_800.0 + number(&start["tow_ms"]) / 1000.0 + 315_964_800.0
-            - 18.0;
+    let values = values(&bench);
     let mut table = "utc,w\n".to_owned();
-    let values = map["drones"][0]["updraft_mps"].as_array().unwrap();
-    for (time, value) in map["time_s"].as_array().unwrap().iter().zip(values) {
-        if let Some(w) = value.as_f64() {
-            writeln!(table, "{:.3},{}", zero_s + number(time) + 4.0, 0.5 + 0.8 * w).unwrap();
-        }
+    for (time_s, w) in values {
+        writeln!(table, "{:.3},{}", time_s + 4.0, 0.5 + 0.8 * w).unwrap();
     }
     fs::write(bench.path("tower.csv"), table).unwrap();
     let ended = bench.expect(0, &["compare", "out", "--mast", "tower.csv", "--json"]);
@@ -111,10 +120,22 @@ fn wrong_records_are_refused_in_words() {
         };
         format!("utc,w\n{}", (0..200).map(row).collect::<Vec<_>>().concat())
     };
-    write("slow.csv", &rows(60, "2021-04-20"));
-    says(2, "slow.csv", "its values are 60 s apart");
+    let hours = |k: u64| format!("2021-04-{:02} {:02}:00:00,0.1\n", 19 + k / 12, 2 * (k % 12));
+    let slowest: String = (0..30).map(hours).collect();
+    write("slowest.csv", &format!("utc,w\n{slowest}"));
+    says(2, "slowest.csv", "its values are 7200 s apart: give one with means over 3600 s or less");
+    write("slow.csv", &rows(600, "2021-04-20").lines().take(60).collect::<Vec<_>>().join("\n"));
+    says(5, "slow.csv", "no mean of the mast over 600 s lies within the flight");
     write("other-day.csv", &rows(1, "2021-04-21"));
     says(5, "other-day.csv", "0 s are in both records");
+    write(
+        "two-spreads.toml",
+        &format!("{MAST}[w_sd]\ncolumns = [\"a\"]\n[w_variance]\ncolumns = [\"b\"]\n"),
+    );
+    says(2, "two-spreads.toml", "w_variance and w_sd say the same");
+    let time = "[time]\ncolumn = \"Time\"\nformat = \"datetime\"\n";
+    write("no-time.toml", &MAST.replace(time, ""));
+    says(2, "no-time.toml", "it is a table, and the mapping has no [time]");
     write("mast-wrong.toml", &MAST.replace("[w]", "height_m = \"x\"\n[w]"));
     says(2, "mast-wrong.toml", "mast-wrong.toml");
     write("one-wind.toml", &format!("{MAST}[u]\ncolumns = [\"roll\"]\n"));

@@ -5,3 +5,4 @@ mod firmware;
 mod maps;
 mod netcdf;
 pub(crate) mod support;
+mod thermals;
