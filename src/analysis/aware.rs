@@ -215,7 +215,8 @@ impl<'a> Aware<'a> {
         (own.is_some(), law, pack)
     }
 
-    /// Vertical air speed, m/s, by other means of a log than those of the map's seconds; and the relative standard error
+    /// Vertical air speed, m/s, by other means of a log than those of the map's seconds, with the slope of small motions around
+    /// hover ([`Shape::near_hover`]); and the relative standard error
     /// of its scale from what wind does to the pulse's slope.
     pub(super) fn values_of(
         &self,
@@ -231,7 +232,7 @@ impl<'a> Aware<'a> {
         let value = |second: &Second| {
             let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
             let (one, _) = self.refer(second, resting_v, pack.as_ref(), &values);
-            Some(one.velocity_mps - values.air_mps(one.pulse_us)?)
+            Some(one.velocity_mps - values.near_hover(values.air_mps(one.pulse_us)?))
         };
         let found = means.iter().map(|second| second.as_ref().and_then(value)).collect();
         (found, self.doubted_slope(means, &values))
@@ -638,6 +639,12 @@ impl Values<'_> {
             }
         }
         air.is_finite().then_some(air)
+    }
+
+    /// Air speed as [`Shape::near_hover`] has it, m/s.
+    fn near_hover(&self, air_mps: f64) -> f64 {
+        let [slowest, fastest] = self.zero.speeds_mps;
+        self.shape.near_hover(&self.law.law, 0.5 * (fastest - slowest), air_mps)
     }
 
     fn common_us2(&self, basis: &[f64; PARAMETERS]) -> f64 {

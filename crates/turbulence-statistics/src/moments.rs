@@ -162,8 +162,9 @@ fn of_mean(count: f64, lags: usize, of: impl Fn(usize) -> f64) -> f64 {
     (of(0) + 2.0 * later) / count
 }
 
-/// Variance of a record, (m/s)²; `noise` is the variance of its white noise, `scale_se` the relative standard error of
-/// the instrument's scale (0.03: all values are known to 3 %). `None` of a record with fewer than 16 values.
+/// Variance of a record, (m/s)²; `noise` is the variance of its white noise, less what means over its steps have lost
+/// ([`Fastest::too_much`](crate::noise::Fastest::too_much)), `scale_se` the relative standard error of the instrument's
+/// scale (0.03: all values are known to 3 %). `None` of a record with fewer than 16 values.
 ///
 /// The random error is that of a Gaussian process with the record's autocovariance; the interval is that of a chi-squared
 /// distribution with the degrees of freedom which give this error.

@@ -1,17 +1,18 @@
 //! Turbulence of a fleet from the records of its drones.
 
 use rayon::prelude::*;
+use turbulence_statistics::Record;
 use turbulence_statistics::dissipation::{
     Component as Direction, Wind, from_spectrum, from_structure,
 };
 use turbulence_statistics::moments::{
     Moment, covariance, expected, length_for_variance_s, mean_variance, skewness, variance,
 };
+use turbulence_statistics::noise::{self, Fastest};
 use turbulence_statistics::spectrum::{
     CrossBand, Instrument, cross, mean as mean_spectrum, spectrum,
 };
 use turbulence_statistics::transfer::Transfer;
-use turbulence_statistics::{Record, noise};
 
 use super::super::statistics::result::TiltWind;
 use super::pairs;
@@ -37,6 +38,20 @@ const HORIZONTAL_HZ: f64 = 0.2;
 /// Relative standard error of the law's slope around hover from its shape: a line that may bend, fitted to a ladder of 3.5 m/s
 /// to each side, is 3 % off there for the vehicles of the simulator (docs/products.md).
 const SHAPE_SE: f64 = 0.03;
+/// Power that the pulse answers vertical gusts with, by frequency, Hz, over that of slow ones: in the middle of what it is in
+/// still air and in wind, in the simulator and in foreign worlds up to 0.4 Hz (docs/products.md). Thrust that accelerates
+/// the drone is not quite what its steady law says, and gusts of the wind that are too fast for the lean move the pulse.
+const PULSE_POWER: [(f64, f64); 9] = [
+    (0.03, 1.0),
+    (0.1, 1.03),
+    (0.2, 1.07),
+    (0.28, 1.1),
+    (0.37, 1.13),
+    (0.5, 1.13),
+    (0.65, 1.08),
+    (0.87, 1.05),
+    (1.0, 1.05),
+];
 /// Relative standard error of the power that pulse and lean answer with, in each band: what is left of it against the air of
 /// the simulator (docs/products.md).
 const RESPONSE_SE: f64 = 0.08;
@@ -279,7 +294,8 @@ fn fleet_scale(drones: &[Drone<'_>]) -> f64 {
 fn vertical(found: &mut Turbulence, drones: &[Drone<'_>], aligned: &[Aligned], common: &Common) {
     let records: Vec<&Record> = aligned.iter().map(|one| &one.w).collect();
     let limit_hz = found.record.vertical_limit_hz;
-    let Some(component) = component(&records, fleet_scale(drones), limit_hz, common) else {
+    let Some(component) = component(&records, VERTICAL, (fleet_scale(drones), limit_hz), common)
+    else {
         return;
     };
     if component.scale_se > ROUGH {
@@ -364,30 +380,45 @@ fn dissipation(
     }
 }
 
+/// How the noise of a channel is told, and the power that it answers gusts with.
+type Channel = (fn(&Record) -> Fastest, &'static [(f64, f64)]);
+const VERTICAL: Channel = (of_blocks, &PULSE_POWER);
+const HORIZONTAL: Channel = (of_lean, &[]);
+
+/// Noise of a record of w, and what its blocks have lost.
+fn of_blocks(record: &Record) -> Fastest {
+    noise::of_means(record).unwrap_or_default()
+}
+
+/// Noise of a record of u or v, whose values are means over more than their steps.
+fn of_lean(record: &Record) -> Fastest {
+    Fastest { noise: noise::white(record).unwrap_or(0.0), lost: 0.0 }
+}
+
 /// Statistics of one component of the fleet.
 fn component(
     records: &[&Record],
-    scale_se: f64,
-    limit_hz: f64,
+    channel: Channel,
+    (scale_se, limit_hz): (f64, f64),
     common: &Common,
 ) -> Option<Component> {
-    let noises: Vec<f64> =
-        records.iter().map(|record| noise::white(record).unwrap_or(0.0)).collect();
-    let white = mean(noises.iter())?;
+    let (fastest, power) = channel;
+    let fastest: Vec<Fastest> = records.iter().map(|record| fastest(record)).collect();
+    let white = mean(fastest.iter().map(|of| of.noise))?;
     let own: Vec<Moment> = records
         .iter()
-        .zip(&noises)
-        .filter_map(|(record, noise)| variance(record, *noise, 0.0))
+        .zip(&fastest)
+        .filter_map(|(record, fastest)| variance(record, fastest.too_much(), 0.0))
         .collect();
     let within = mean(own.iter().map(|own| own.value - own.systematic))?;
     let time_s = integral_time(records);
     let known = time_s.filter(|time| time.value * FEWEST_TIMES <= common.length_s);
     let variance = known.and_then(|_| fleet_variance(records, &own, scale_se));
-    let instrument = instrument(white, scale_se, limit_hz, common.step_s);
+    let instrument = instrument(white, scale_se, (limit_hz, common.step_s), power);
     let skewnesses: Vec<Moment> = records
         .iter()
-        .zip(&noises)
-        .filter_map(|(record, noise)| skewness(record, *noise))
+        .zip(&fastest)
+        .filter_map(|(record, fastest)| skewness(record, fastest.noise))
         .collect();
     Some(Component {
         mean_mps: mean(records.iter().filter_map(|record| record.mean()))?,
@@ -405,8 +436,13 @@ fn component(
     })
 }
 
-fn instrument(noise: f64, scale_se: f64, highest_hz: f64, step_s: f64) -> Instrument {
-    let transfer = Transfer { mean_s: step_s, ..Transfer::NONE };
+fn instrument(
+    noise: f64,
+    scale_se: f64,
+    (highest_hz, step_s): (f64, f64),
+    power: &[(f64, f64)],
+) -> Instrument {
+    let transfer = Transfer { mean_s: step_s, gain2: power.to_vec(), ..Transfer::NONE };
     // A line at the very end would be a band of its own.
     let highest_hz = 0.999 * highest_hz;
     Instrument { transfer, noise, scale_se, response_se: RESPONSE_SE, highest_hz }
@@ -479,8 +515,8 @@ fn horizontal(
         return;
     };
     let limit_hz = found.record.horizontal_limit_hz;
-    found.along = component(&along, share, limit_hz, common);
-    found.across = component(&across, share, limit_hz, common);
+    found.along = component(&along, HORIZONTAL, (share, limit_hz), common);
+    found.across = component(&across, HORIZONTAL, (share, limit_hz), common);
     for (name, one, records) in [("u", &found.along, &along), ("v", &found.across, &across)] {
         if one.as_ref().is_some_and(|one| one.scales.is_none()) {
             found.absent.push(short(name, common.length_s, integral_time(records)));
@@ -528,7 +564,7 @@ fn cospectrum(
     random_share: f64,
     common: &Common,
 ) -> Vec<CrossBand> {
-    let instrument = instrument(0.0, 0.0, limit_hz, common.step_s);
+    let instrument = instrument(0.0, 0.0, (limit_hz, common.step_s), &[]);
     let each: Vec<_> = aligned
         .par_iter()
         .filter_map(|one| Some(cross(one.component(1)?, &one.w, &instrument)))
@@ -581,17 +617,18 @@ fn each(
         found.vertical.as_ref().and_then(|of| of.scales).map(|scales| 0.5 / scales.time_s.value);
     let limit_hz = found.record.vertical_limit_hz;
     let one = |(drone, one): (&Drone<'_>, &Aligned)| {
-        let noise = |record: &Record| noise::white(record).unwrap_or(0.0);
         let own_se =
             drone.records.slope_share[0].hypot(SHAPE_SE).hypot(drone.records.slope_share[1]);
-        let white = noise(&one.w);
+        let white = of_blocks(&one.w).noise;
         let of = |which: usize, is_known: bool, scale_se: f64| {
             let record = one.component(which).filter(|_| is_known)?;
-            variance(record, noise(record), scale_se)
+            let fastest = if which == 0 { of_blocks } else { of_lean };
+            variance(record, fastest(record).too_much(), scale_se)
         };
         let (vertical, along, across) =
             (of(0, up, own_se), of(1, along, share), of(2, across, share));
-        let spectrum = spectrum(&one.w, &instrument(white, own_se, limit_hz, common.step_s));
+        let instrument = instrument(white, own_se, (limit_hz, common.step_s), &PULSE_POWER);
+        let spectrum = spectrum(&one.w, &instrument);
         let dissipation = common.wind.zip(largest_hz).and_then(|(wind, largest_hz)| {
             let wind = Wind { speed_mps: wind.value, se_mps: wind.se };
             from_spectrum(&spectrum, Direction::Across, wind, largest_hz, own_se).ok()

@@ -121,7 +121,7 @@ pub struct Component {
     /// Variance, (m/s)², mean over the drones; absent: the record is too short for its eddies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance: Option<Moment>,
-    /// Variance about the record's own mean, noise taken off and nothing added: what is faster than the record, (m/s)².
+    /// Variance about the record's own mean, without noise, what blocks took added: what is faster than the record, (m/s)².
     pub within_record: f64,
     /// Variance of the white noise of one value that was taken off, (m/s)².
     pub noise: f64,

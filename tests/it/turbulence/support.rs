@@ -1,8 +1,7 @@
-//! Campaigns of one calibration and many hovers, each in air of its own.
+//! Campaigns of a calibration and a hover, each in air of its own.
 
 #![expect(clippy::unwrap_used, reason = "this is test code")]
 
-use std::fs;
 use std::path::Path;
 
 use updraft::analysis::AnalysisOptions;
@@ -51,36 +50,29 @@ impl Fleet {
         campaign::flights(root).unwrap()
     }
 
-    /// Turbulence of hovers in such air, each with its own seed, by a calibration in steady wind.
+    /// Turbulence of hovers in such air, each of drones and a calibration in steady wind of its own: a seed draws the drones, too.
     pub(crate) fn flown(
         &self,
         seeds: std::ops::Range<u64>,
         air: &[&str],
         wind: &str,
     ) -> Vec<Turbulence> {
-        let folder = tempfile::tempdir().unwrap();
-        let root = folder.path().join("campaign");
-        let flights = self.plan(&root);
         let host = Quiet::default();
-        let fly = |folder: &FlightFolder, seed: u64, air: &[&str]| {
-            let specs: Vec<_> = air.iter().flat_map(|part| spec::load(part).unwrap()).collect();
-            let air = Air::new([0.0; 3], &specs);
-            let plan = folder.read_plan().unwrap();
-            simulate(&host, folder, &plan, &Simulation::new(air, seed)).unwrap();
-        };
-        fly(&flights[0], 1, &[wind]);
-        let mut work = Work::new(&root);
-        find(&flights[0].0, None, &mut work).unwrap();
-        for seed in seeds {
-            let own = FlightFolder(folder.path().join(format!("hover-{seed}")));
-            fs::create_dir(&own.0).unwrap();
-            for file in ["plan.json", "vehicle.toml", "template.toml"] {
-                fs::copy(flights[1].0.join(file), own.0.join(file)).unwrap();
+        let campaign = |seed: u64| {
+            let folder = tempfile::tempdir().unwrap();
+            let root = folder.path().join("campaign");
+            let flights = self.plan(&root);
+            for (flight, air) in flights.iter().zip([vec![wind], [air, &[wind]].concat()]) {
+                let specs: Vec<_> = air.iter().flat_map(|part| spec::load(part).unwrap()).collect();
+                let air = Air::new([0.0; 3], &specs);
+                let plan = flight.read_plan().unwrap();
+                simulate(&host, flight, &plan, &Simulation::new(air, seed)).unwrap();
             }
-            fly(&own, seed, &[air, &[wind]].concat());
-            find(&own.0, None, &mut work).unwrap();
-        }
-        analysed(&work)
+            let mut work = Work::new(&root);
+            find(&root, None, &mut work).unwrap();
+            analysed(&work)
+        };
+        seeds.flat_map(campaign).collect()
     }
 }
 
