@@ -41,15 +41,22 @@ pub(super) struct Calibrations {
     pub(super) scatter: f64,
 }
 
+impl Calibrations {
+    /// One calibration is as good as two where its law is flat near hover: an error of its zero is then no shift.
+    fn as_far_as_errors_cancel(self, maps: [&UpdraftMap; 2]) -> Self {
+        let is_flat = maps.iter().any(|map| map.law == LawKind::SignedQuadratic);
+        Self { are_one: self.are_one && !is_flat, ..self }
+    }
+}
+
 /// Compares the maps of two flights. Also tells why places were not compared.
 pub(super) fn compare(
     couple: &Couple<'_>,
     [a, b]: [&UpdraftMap; 2],
     calibrations: Calibrations,
 ) -> Option<(MapComparison, Option<String>)> {
-    let bends = [a, b].iter().any(|map| map.law == LawKind::SignedQuadratic);
     let is_shared = calibrations.are_one;
-    let calibrations = Calibrations { are_one: is_shared && !bends, ..calibrations };
+    let calibrations = calibrations.as_far_as_errors_cancel([a, b]);
     let mean = means(a, b, calibrations)?;
     let fleet = |map: &UpdraftMap| map.posterior.as_ref().and_then(|posterior| posterior.fleet);
     let posterior = fleet(a).zip(fleet(b)).filter(|_| !calibrations.are_one);
@@ -410,6 +417,28 @@ mod tests {
         one[0] = place(0.0, 0.0, 0.3, 1.7);
         // By hand: one of five is 1 off, so that the squares sum up to 0.8, over 0.04.
         assert!((pattern(&one).unwrap().0 - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_zero_of_one_calibration_cancels_by_a_line_alone() {
+        let map = |law: &str, mean_mps: f64| -> UpdraftMap {
+            serde_json::from_value(serde_json::json!({
+                "law": law, "time_s": [], "common": { "se_mps": 0.3, "half_width_mps": 0.6, "zero_mps": 0.3 },
+                "drones": [{
+                    "slot": 1, "name": "Drone 1", "position_m": null, "height_m": 100.0, "mapping": "own",
+                    "mean": { "value": mean_mps, "se": 0.3 }, "updraft_mps": [], "truth_mps": null,
+                }],
+            }))
+            .unwrap()
+        };
+        let error = |law: &str, slope_share: f64| {
+            let (a, b) = (map(law, 0.2), map(law, 0.8));
+            let one = Calibrations { are_one: true, slope_share, scatter: 1.0 };
+            means(&a, &b, one.as_far_as_errors_cancel([&a, &b])).unwrap().change.se
+        };
+        assert!(error("linear", 0.0) < 1e-9);
+        assert!((error("linear", 0.1) - 0.06).abs() < 1e-9);
+        assert!((error("signed quadratic", 0.0) - 0.3 * 2.0_f64.sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -166,7 +166,9 @@ impl Rows<'_> {
 
     fn component(&mut self, name: &str, of: Option<&Component>) {
         let Some(of) = of else { return };
-        self.alone(&format!("mean_{name}"), "m s-1", Some(of.mean_mps));
+        // That across the wind is zero by its definition, and rounding is none.
+        let mean_mps = if of.mean_mps.abs() < 1e-9 { 0.0 } else { of.mean_mps };
+        self.alone(&format!("mean_{name}"), "m s-1", Some(mean_mps));
         self.moment(&format!("variance_{name}"), "m2 s-2", of.variance);
         self.alone(&format!("variance_{name}_within_record"), "m2 s-2", Some(of.within_record));
         self.alone(&format!("noise_variance_{name}"), "m2 s-2", Some(of.noise));
