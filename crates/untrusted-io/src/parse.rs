@@ -52,7 +52,7 @@ pub fn toml<T: DeserializeOwned>(text: &str) -> Result<T, toml::de::Error> {
 /// Words of an error of [`toml()`] with its line, except where it is of the whole text: what is missing has no line.
 pub fn toml_trouble(text: &str, error: &toml::de::Error) -> String {
     match error.span() {
-        Some(span) if span.start > 0 || span.end < text.trim_end().len() => {
+        Some(span) if span != (0..0) && span != (0..text.len()) => {
             error.to_string().trim_end().to_owned()
         }
         _ => error.message().to_owned(),
