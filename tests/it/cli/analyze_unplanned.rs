@@ -103,7 +103,7 @@ fn a_hover_alone_is_whole_with_the_laws_of_an_earlier_day() {
     fly(&today, "today", &[]);
     fs::remove_dir_all(today.path("today/calibration/simulated")).unwrap();
     let laws = bench.path("campaign/analysis.json");
-    let alone = analyze(&today, 3, &["today"]);
+    let alone = analyze(&today, 5, &["today"]);
     assert!(alone.out.contains("calibration: no logs to analyse"), "{alone}");
     let held = analyze(&today, 0, &["today", "--hold", laws.to_str().unwrap()]);
     assert!(!held.out.contains("no logs to analyse"), "{held}");
