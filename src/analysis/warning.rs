@@ -128,7 +128,7 @@ pub enum Warning {
         /// Names of the drones without a voltage in the calibration.
         in_calibration: Vec<String>,
     },
-    /// What drones measure depends on the levels of the laws that they measure with.
+    /// Measurements depend on the levels of the laws that they are made with.
     LawsOfOthers {
         /// Number of drones.
         drones: usize,
