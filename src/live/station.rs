@@ -19,7 +19,7 @@ use super::view::{AirView, DroneView, Level, PreflightView, Question, Said, Step
 use crate::base::causes::with_causes;
 use crate::base::time::GpsTime;
 use crate::fleet::abort::Action;
-use crate::fleet::messages::mode_name;
+use crate::fleet::messages::{LAND, RTL, mode_name};
 use crate::fleet::order_handler::Notice;
 use crate::fleet::orders::{OrderFrom, give};
 use crate::fleet::preflight::{COLUMNS, Preflight};
@@ -479,10 +479,10 @@ impl Station {
         view.stage = stage(state);
         view.armed = state.is_armed();
         // The flight mode of one that was sent home says no more when it is there.
-        if view.armed == Some(false)
-            && flying.is_some_and(|of| of.flew && !of.fell)
-            && state.status.is_none_or(|(_, status)| status.stage == Stage::Off)
-        {
+        let came_down = state.mode.is_some_and(|(_, mode)| [RTL, LAND].contains(&mode));
+        let fell = flying.is_some_and(|of| of.fell);
+        let is_off = state.status.is_none_or(|(_, status)| status.stage == Stage::Off);
+        if view.armed == Some(false) && came_down && is_off && !fell {
             view.stage = Stage::Landed.to_string();
         }
         view.heard_ms = Some(now_ms.saturating_sub(at.saturating_sub(state.heard) / 1000));
