@@ -132,7 +132,7 @@ impl About {
         if self.start_s < first_s || end_s > last_s {
             return Err(self.outside(format!(
                 "the flight takes {duration_s:.0} s, from {:.1} to {end_s:.1} s of the model, whose times are {first_s:.1} \
-                 to {last_s:.1} s: choose an earlier start=, a shorter flight, or mode=advect",
+                 to {last_s:.1} s: choose another start=, a shorter flight, or mode=advect",
                 self.start_s
             )));
         }

@@ -25,6 +25,26 @@ fn unit_m(units: Option<&str>) -> Option<f64> {
     }
 }
 
+/// Whether a unit is metres per second, as models write it; without one nothing speaks against it.
+fn is_mps(units: &str) -> bool {
+    let letters: String =
+        units.to_ascii_lowercase().chars().filter(|letter| !letter.is_whitespace()).collect();
+    let known = [
+        "",
+        "m/s",
+        "ms-1",
+        "ms^-1",
+        "ms**-1",
+        "m.s-1",
+        "ms^{-1}",
+        "meterssecond-1",
+        "metersecond-1",
+        "metres/second",
+        "meters/second",
+    ];
+    known.contains(&letters.as_str())
+}
+
 /// Duration of a unit of time, s: `seconds since ...` is one of seconds.
 fn unit_s(units: Option<&str>) -> Option<f64> {
     let text = units.unwrap_or("s").to_ascii_lowercase();
@@ -51,6 +71,11 @@ pub(super) fn layout(file: &File, names: &ComponentMap, map: &LesMap) -> Result<
             "it must be numbers over time, z, y and x (4 dimensions), but has {} dimensions{}",
             variable.ndim(),
             if is_number(variable) { "" } else { " and no numbers" }
+        )));
+    }
+    if let Some(units) = file.units(&names.variable).filter(|units| !is_mps(units)) {
+        return Err(wrong(format!(
+            "its unit is \"{units}\", and air is read in m/s: convert it (ncap2 -s), or correct its attribute units"
         )));
     }
     let mut axes = Vec::new();
@@ -211,6 +236,8 @@ mod tests {
         assert_eq!(unit_m(Some("m")), Some(1.0));
         assert_eq!(unit_m(Some("km")), Some(1000.0));
         assert_eq!(unit_m(None), Some(1.0));
+        assert!(["m/s", "m s-1", "m s**-1", ""].into_iter().all(is_mps));
+        assert!(!["cm/s", "K", "m"].into_iter().any(is_mps));
         assert_eq!(unit_m(Some("degrees_east")), None);
         assert_eq!(unit_s(Some("seconds since 2019-06-21 12:00:00 +00")), Some(1.0));
         assert_eq!(unit_s(Some("minutes")), Some(60.0));

@@ -172,7 +172,12 @@ impl MastMapping {
         if self.w.is_none() {
             return Err(missing("w"));
         }
-        Ok(Wish { delimiter: self.delimiter, time, channels: self.channels() })
+        Ok(self.wish_of(time))
+    }
+
+    fn wish_of<'a>(&'a self, time: &'a TimeColumn) -> Wish<'a> {
+        // One mean of a slow mast is something to compare with.
+        Wish { delimiter: self.delimiter, time, channels: self.channels(), fewest_rows: 1 }
     }
 
     fn refusal(&self) -> Option<String> {
@@ -181,8 +186,7 @@ impl MastMapping {
         }
         let any = TimeColumn { column: String::new(), format: TimeFormat::S, utc_offset_h: None };
         let time = self.time.as_ref().unwrap_or(&any);
-        let all = Wish { delimiter: self.delimiter, time, channels: self.channels() };
-        if let Some(reason) = all.refusal() {
+        if let Some(reason) = self.wish_of(time).refusal() {
             return Some(reason);
         }
         if self.w_variance.is_some() && self.w_sd.is_some() {

@@ -9,7 +9,7 @@ use super::raw::Raw;
 use crate::base::file::{FileError, open_named};
 use crate::flight::Series;
 use crate::flight::table::read_columns;
-use crate::numeric::median;
+use crate::numeric::{median, rms};
 
 /// Longest first lines that are looked at for names of columns, bytes.
 const HEAD_BYTES: u64 = 64 << 10;
@@ -18,6 +18,10 @@ const HEAD_BYTES: u64 = 64 << 10;
 const SLOWEST_S: f64 = 5.0;
 /// Longer means are none of the air at a place, s.
 const LONGEST_S: f64 = 3600.0;
+/// Faster air is a value that stands for none, m/s.
+pub(super) const FASTEST_MPS: f64 = 200.0;
+/// Vertical air speeds are not as strong as this in the root of their mean square, m/s.
+const STRONG_MPS: f64 = 10.0;
 /// Share of the values that a mean must have.
 const COVERED: f64 = 0.8;
 /// First bytes of NetCDF files, classic and NetCDF-4.
@@ -75,6 +79,27 @@ impl MastRecord {
     fn of(raw: Raw, file: &Path, mapping: Option<&MastMapping>) -> Result<Self, MastError> {
         let broken = |reason: String| MastError::Record { path: file.to_owned(), reason };
         let Raw { zero_ms, mut w, mut w_variance, mut wind, mut notes, .. } = raw;
+        let mut left_out = take_out(&mut w, FASTEST_MPS);
+        for series in wind.iter_mut().flatten() {
+            left_out += take_out(series, FASTEST_MPS);
+        }
+        if let Some(variance) = &mut w_variance {
+            left_out += take_out(variance, FASTEST_MPS.powi(2));
+        }
+        if left_out > 0 {
+            notes.push(format!(
+                "{left_out} values of the mast are faster than {FASTEST_MPS:.0} m/s, which stands for none, and are left out"
+            ));
+        }
+        if w.value.is_empty() {
+            return Err(broken("no value of w is a vertical air speed in m/s".to_owned()));
+        }
+        let strong_mps = rms(&w.value).unwrap_or_default();
+        if strong_mps > STRONG_MPS {
+            notes.push(format!(
+                "w of the mast has a root mean square of {strong_mps:.1} m/s: is it in m/s? A mapping has scale = 0.01 for cm/s"
+            ));
+        }
         let steps = w.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let step_s = median(steps).unwrap_or(f64::INFINITY);
         let mean_s = raw.mean_s.unwrap_or(step_s);
@@ -127,7 +152,10 @@ impl MastRecord {
             .map(<[f64; 2]>::from)
             .or(raw.place_deg);
         if place_deg.is_none() {
-            notes.push("the mast's place is not known: distances are not told".to_owned());
+            notes.push(
+                "the mast's place is not known: distances are not told, and the drone that is called the nearest is the first"
+                    .to_owned(),
+            );
         }
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         Ok(Self {
@@ -158,6 +186,20 @@ impl MastRecord {
         let enough = (COVERED * length_s / self.step_s).max(1.0);
         (values.len() as f64 >= enough).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
+}
+
+/// Takes out what is no air; the number of values.
+fn take_out(series: &mut Series, most: f64) -> usize {
+    let is_air = |value: f64| value.abs() <= most;
+    let kept: Vec<usize> =
+        (0..series.value.len()).filter(|index| is_air(series.value[*index])).collect();
+    let finite = series.value.iter().filter(|value| !value.is_nan()).count();
+    let taken = finite - kept.len();
+    if kept.len() < series.value.len() {
+        series.time_s = kept.iter().map(|index| series.time_s[*index]).collect();
+        series.value = kept.iter().map(|index| series.value[*index]).collect();
+    }
+    taken
 }
 
 /// Whether a file is NetCDF, by its first bytes; the name counts where it has none.

@@ -64,9 +64,10 @@ pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
     let stated = match (fleet.stated_se_mps, fleet.bias_se_mps) {
         (Some(se), sampling) => {
             let beyond = fleet.bias_mps.abs() > 1.96 * se.hypot(sampling.unwrap_or(0.0));
-            let within = if beyond { "more than that" } else { "within that" };
+            let within = if beyond { "more than" } else { "within" };
+            let what = if sampling.is_some() { "the two together" } else { "that" };
             format!(
-                ", and state a standard error of {} m/s for it: the bias is {within} (95 %)",
+                ", and state a standard error of {} m/s for it: the bias is {within} {what} (95 %)",
                 fixed(se, 2)
             )
         }

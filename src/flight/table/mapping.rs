@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::TableError;
-use super::read::Wish;
+use super::read::{FEWEST_ROWS, Wish};
 use crate::base::file::read_whole;
 use crate::base::parse;
 use crate::flight::Indicator;
@@ -166,7 +166,12 @@ impl Mapping {
 
     /// Columns that are read of each table.
     pub(super) fn wish(&self) -> Wish<'_> {
-        Wish { delimiter: self.delimiter, time: &self.time, channels: self.channels() }
+        Wish {
+            delimiter: self.delimiter,
+            time: &self.time,
+            channels: self.channels(),
+            fewest_rows: FEWEST_ROWS,
+        }
     }
 
     /// The channels, with their names in the file.

@@ -88,9 +88,9 @@ pub enum TableError {
         /// Largest size that is read, bytes.
         most: u64,
     },
-    /// The table has too few usable rows for a flight.
+    /// The table has too few usable rows.
     #[error(
-        "{}: {rows} usable rows are no flight{}",
+        "{}: {rows} usable rows are too few{}",
         path.shown(),
         left_out(*backward)
     )]

@@ -24,7 +24,7 @@ const LATEST_S: f64 = 1e12;
 /// No local time is further from UTC, h.
 const FURTHEST_ZONE_H: f64 = 26.0;
 /// Fewer rows are no flight.
-const FEWEST_ROWS: usize = 20;
+pub(super) const FEWEST_ROWS: usize = 20;
 
 /// Columns of one channel in the table.
 struct Wanted<'a> {
@@ -72,6 +72,8 @@ pub struct Wish<'a> {
     pub time: &'a TimeColumn,
     /// Quantities, each with its name in messages.
     pub channels: Vec<(&'static str, &'a Channel)>,
+    /// Fewest rows that are enough.
+    pub fewest_rows: usize,
 }
 
 impl Wish<'_> {
@@ -196,7 +198,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
             cut_off = Some(TableError::Row { path: path.to_owned(), reason });
         }
     }
-    if rows.taken < FEWEST_ROWS {
+    if rows.taken < wish.fewest_rows {
         let Rows { taken, backward, .. } = rows;
         return Err(TableError::Short { path: path.to_owned(), rows: taken, backward });
     }

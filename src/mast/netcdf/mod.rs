@@ -15,6 +15,7 @@ use crate::flight::Series;
 use crate::flight::table::{Channel, TimeFormat};
 use crate::numeric::median;
 
+use super::record::FASTEST_MPS;
 use choose::{Quantity, find};
 use layout::{Layout, layout, place_deg};
 use units::{since, speed_mps, variance_m2ps2};
@@ -23,8 +24,6 @@ use units::{since, speed_mps, variance_m2ps2};
 const MOST_TIMES: u64 = 20_000_000;
 /// Times that are read at once.
 const AT_ONCE: u64 = 1 << 18;
-/// Faster air is a value that stands for none, m/s.
-const FASTEST_MPS: f64 = 200.0;
 /// No time is further from 1970, s: what never was written is larger.
 const LATEST_S: f64 = 1e11;
 /// Share of the distance between times to which a number of 32 bits must know them.
