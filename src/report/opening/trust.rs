@@ -1,5 +1,6 @@
 //! The largest doubts about an analysis, in words, the worst first.
 
+use crate::analysis::LawKind;
 use crate::analysis::Warning;
 use crate::analysis::WindHandled;
 use crate::analysis::result::{
@@ -120,11 +121,16 @@ fn largest_error(map: &UpdraftMap) -> Option<Doubt> {
     } else {
         ""
     };
+    let does = if map.law == LawKind::SignedQuadratic {
+        "By a law that is flat near hover it makes the air too weak or too strong, differences between drones and \
+         their strength as well."
+    } else {
+        "It shifts the whole map alike; differences between drones are free of it."
+    };
     Some((
         2,
         format!(
-            "Most of what all drones share of the error ({} of {} m/s{beside}) is {words}. It shifts the \
-             whole map alike; differences between drones are free of it.",
+            "Most of what all drones share of the error ({} of {} m/s{beside}) is {words}. {does}",
             fixed(size, 2),
             fixed(common.se_mps, 2),
         ),
