@@ -110,7 +110,7 @@ pub(super) fn circumstances(analysis: &Analysis) -> Vec<String> {
 /// `The laws that measure are held from an earlier calibration of 16 drones, 2026-06-01 12:00 UTC (still/analysis.json).`
 pub(in crate::report) fn laws_sentence(from: &LawsFrom) -> String {
     let when = from.start.map_or_else(String::new, |start| {
-        let (day, time) = day_and_time(start.to_unix_ms().div_euclid(1000));
+        let (day, time) = day_and_time((start.to_unix_ms() + 500).div_euclid(1000));
         format!(", {day} {} UTC", time.get(..5).unwrap_or(&time))
     });
     let drones = count(from.drones, "drone");
