@@ -133,7 +133,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let left = held_hover::end_where_left(flight, &mut of_air);
     let seen = Seen { flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
-    let updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
+    let mut updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
         (None, None, _) => None,
         (_, _, Some(reason)) => Some(Err(reason.clone())),
         (Some(level), ..) => {
@@ -141,14 +141,11 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         }
         (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
     };
-    let updraft = updraft.map(|found| {
-        found.map(|(mut series, law)| {
-            if let Some(measured) = &mut series.measured {
-                measured.quality.extend(left);
-            }
-            (series, law)
-        })
-    });
+    if let Some(Ok((series, _))) = &mut updraft
+        && let Some(measured) = &mut series.measured
+    {
+        measured.quality.extend(left);
+    }
     let source = input.shown(&log.path);
     let drone = DroneAnalysis {
         slot: number,

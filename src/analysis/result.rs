@@ -35,6 +35,7 @@ use crate::base::sentence::Sentence;
 use crate::base::time::GpsTime;
 use crate::flight::{Clock, Indicator};
 use crate::mission::plan::Purpose;
+use crate::numeric::upper_median;
 
 /// Name and version of the analysis format.
 pub const ANALYSIS_SCHEMA: &str = "updraft.analysis/1";
@@ -227,6 +228,13 @@ pub enum Yield {
 }
 
 impl FlightAnalysis {
+    /// GPS time of show time 0, as the middle one of the logs has it; `None`: none has GPS time.
+    pub fn start(&self) -> Option<GpsTime> {
+        let starts = self.drones.iter().filter_map(|drone| drone.clock.start);
+        upper_median(starts.map(|start| start.total_ms() as f64).collect())
+            .and_then(|ms| GpsTime::from_total_ms(ms as i64))
+    }
+
     /// Number of drones with a result of the kind that the flight was for: laws, or a value of the
     /// map.
     pub fn results(&self) -> usize {

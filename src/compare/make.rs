@@ -10,6 +10,7 @@ use super::result::{AllEqual, COMPARE_SCHEMA, Comparison, LawComparison, Quantit
 use super::side::{Couple, FlightOf, Side, couples};
 use super::structure;
 use crate::analysis::LawKind;
+use crate::analysis::turbulence::SHAPE_SE;
 use crate::base::estimate::Estimate;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
@@ -17,8 +18,6 @@ use crate::numeric::median;
 
 /// Names that a sentence has at most.
 const MOST_NAMED: usize = 12;
-/// A line that may bend has a slope in hover that its ladder's mean slope is off by this share; see docs/products.md.
-const BENT_SHARE: f64 = 0.03;
 
 /// Error of a comparison: there is nothing to compare.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -114,7 +113,7 @@ fn slope_share(couple: &Couple<'_>) -> Option<f64> {
     let line = couple.reference.flight.flock.as_ref()?.linear.as_ref()?;
     let slope = line.parameters.first()?.estimate;
     let share = slope.se / slope.value.abs();
-    share.is_finite().then(|| share.hypot(BENT_SHARE))
+    share.is_finite().then(|| share.hypot(SHAPE_SE))
 }
 
 /// Everything of two campaigns.

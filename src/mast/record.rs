@@ -19,7 +19,7 @@ const SLOWEST_S: f64 = 5.0;
 /// Longer means are none of the air at a place, s.
 const LONGEST_S: f64 = 3600.0;
 /// Faster air is a value that stands for none, m/s.
-pub(super) const FASTEST_MPS: f64 = 200.0;
+const FASTEST_MPS: f64 = 200.0;
 /// Vertical air speeds are not as strong as this in the root of their mean square, m/s.
 const STRONG_MPS: f64 = 10.0;
 /// Share of the values that a mean must have.

@@ -12,7 +12,7 @@ use super::typographic::typographic;
 /// Most lines of the table.
 const MOST_LINES: usize = 400;
 /// Columns of a drone's label.
-const LABEL: usize = 28;
+pub(super) const LABEL: usize = 28;
 
 /// Stretches with one doubt, whose reasons differ in their numbers alone.
 struct Kind {

@@ -37,7 +37,7 @@ const VERTICAL_SHARE: f64 = 0.25;
 const HORIZONTAL_HZ: f64 = 0.2;
 /// Relative standard error of the law's slope around hover from its shape: a line that may bend, fitted to a ladder of 3.5 m/s
 /// to each side, is 3 % off there for the vehicles of the simulator (docs/products.md).
-const SHAPE_SE: f64 = 0.03;
+pub(crate) const SHAPE_SE: f64 = 0.03;
 /// Power that the pulse answers vertical gusts with, by frequency, Hz, over that of slow ones: in the middle of what it is in
 /// still air and in wind, in the simulator and in foreign worlds up to 0.4 Hz (docs/products.md). Thrust that accelerates
 /// the drone is not quite what its steady law says, and gusts of the wind that are too fast for the lean move the pulse.

@@ -10,5 +10,6 @@ mod records;
 pub mod result;
 mod scales;
 
+pub(crate) use make::SHAPE_SE;
 pub(super) use make::{Asked, Drone, of_fleet};
 pub(super) use records::Records;

@@ -15,7 +15,6 @@ use crate::flight::Series;
 use crate::flight::table::{Channel, TimeFormat};
 use crate::numeric::median;
 
-use super::record::FASTEST_MPS;
 use choose::{Quantity, find};
 use layout::{Layout, layout, place_deg};
 use units::{since, speed_mps, variance_m2ps2};
@@ -227,13 +226,11 @@ impl Reader<'_> {
                 )));
             }
         };
-        let most = if quantity == Quantity::Variance { FASTEST_MPS.powi(2) } else { FASTEST_MPS };
         let mut values = Vec::new();
         for start in (0..layout.count).step_by(AT_ONCE as usize) {
             let end = (start + AT_ONCE).min(layout.count);
             let part = self.file.part(name, layout.times(start, end)).map_err(wrong)?;
-            let is_air = |value: f64| if value.abs() <= most { value } else { f64::NAN };
-            values.extend(part.into_iter().map(|value| is_air(value * unit)));
+            values.extend(part.into_iter().map(|value| value * unit));
         }
         let times = self.times(&layout)?;
         let methods = text(variable, "cell_methods").unwrap_or_default();

@@ -4,7 +4,7 @@ use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis, FlightSit
 use crate::base::calendar::date;
 use crate::base::time::GpsTime;
 use crate::mission::plan::Purpose;
-use crate::numeric::{extent, upper_median};
+use crate::numeric::extent;
 use crate::report::page::capitalised;
 use crate::report::text::{clean, count, fixed, purpose, shortened, usable};
 
@@ -57,10 +57,7 @@ pub(in crate::report) fn when(flight: &FlightAnalysis) -> Option<When> {
         drone.windows.iter().flat_map(used).filter(|s| usable(*s)).collect::<Vec<_>>()
     };
     let (low, high) = extent(flight.drones.iter().flat_map(ends))?;
-    let starts = flight.drones.iter().filter_map(|drone| drone.clock.start);
-    let zero = upper_median(starts.map(|start| start.total_ms() as f64).collect())
-        .and_then(|ms| GpsTime::from_total_ms(ms as i64));
-    Some(When { zero, span_s: [low, high] })
+    Some(When { zero: flight.start(), span_s: [low, high] })
 }
 
 /// `47.4733° N, 19.0621° E, ground 190 m above sea level`

@@ -6,6 +6,7 @@ use crate::analysis::WindHandled;
 use crate::analysis::result::{
     Analysis, CommonError, DroneUpdraft, FlightAnalysis, Quality, UpdraftMap,
 };
+use crate::report::doubts::LABEL;
 use crate::report::page::capitalised;
 use crate::report::text::{clean, count, fixed, sentence, shortened, usable};
 
@@ -13,9 +14,6 @@ use crate::report::text::{clean, count, fixed, sentence, shortened, usable};
 const MOST: usize = 4;
 /// True values inside 95 % intervals below which the intervals are called too narrow.
 const LEAST_INSIDE: f64 = 0.85;
-
-/// Columns of a drone's label.
-const LABEL: usize = 28;
 
 /// How bad a doubt is, and its words.
 type Doubt = (u8, String);

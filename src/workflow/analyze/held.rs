@@ -8,13 +8,11 @@ use std::path::Path;
 
 use crate::analysis::result::{Analysis, FlightAnalysis, LawsFrom};
 use crate::base::plain::Shown as _;
-use crate::base::time::GpsTime;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
-use crate::numeric::upper_median;
 use crate::workflow::analysis_file::AnalysisFile;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work};
@@ -38,10 +36,7 @@ pub(super) fn read(path: &Path) -> Result<(FlightAnalysis, LawsFrom), WorkflowEr
         .ok_or_else(|| {
             WorkflowError::Usage(format!("{} has no calibration to hold", path.shown()))
         })?;
-    let starts = calibration.drones.iter().filter_map(|drone| drone.clock.start);
-    let start = upper_median(starts.map(|start| start.total_ms() as f64).collect())
-        .and_then(|ms| GpsTime::from_total_ms(ms as i64));
-    let drones = calibration.drones.iter().filter(|drone| drone.laws.is_some()).count();
+    let (start, drones) = (calibration.start(), calibration.results());
     let path = file.shown().to_string();
     Ok((calibration, LawsFrom { path, sha256, title, drones, start }))
 }
