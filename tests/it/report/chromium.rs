@@ -275,14 +275,28 @@ impl Tab<'_> {
         self.sleep_ms(50);
     }
 
-    /// A real click in the middle of an element, brought into view first.
+    /// A real click in the middle of an element, brought into view first. A page may still scroll smoothly to what was
+    /// clicked before: the click waits until the element stands still and is what lies below the pointer.
     pub(crate) fn click_on(&mut self, selector: &str) {
         let quoted = json!(selector);
-        self.run(&format!(
-            "document.querySelector({quoted}).scrollIntoView({{ block: 'center', behavior: 'instant' }})"
+        let at = self.value(&format!(
+            "(async () => {{ \
+               const one = document.querySelector({quoted}); \
+               let last = [NaN, NaN]; \
+               for (let look = 0; look < 60; look++) {{ \
+                 one.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
+                 await new Promise((done) => setTimeout(done, 25)); \
+                 const r = one.getBoundingClientRect(); \
+                 const at = [r.x + r.width / 2, r.y + r.height / 2]; \
+                 const below = document.elementFromPoint(...at); \
+                 const still = at[0] === last[0] && at[1] === last[1]; \
+                 if (still && below && one.contains(below)) return at; \
+                 last = at; \
+               }} \
+               return last; \
+             }})()"
         ));
-        let [x, y, width, height] = self.place(selector);
-        self.click([x + width / 2.0, y + height / 2.0]);
+        self.click(std::array::from_fn(|i| at[i].as_f64().unwrap()));
     }
 
     /// Presses a key where the focus is.
