@@ -46,30 +46,24 @@ impl Thermal {
 
     /// In a sentence.
     pub fn sentence(&self) -> String {
-        let half = |estimate: &Estimate| NORMAL * estimate.se;
+        let interval = |of: &Estimate| Estimate::new(of.value, NORMAL * of.se).to_string();
         let [x, y] = &self.core_m;
         let [u, v] = &self.drift_mps;
         let drift = u.value.hypot(v.value);
-        let drift_half = half(u).hypot(half(v));
+        let drift_half = NORMAL * (u.se + v.se);
         let moves = if drift > drift_half {
             format!(", drifting at {drift:.1} m/s")
         } else {
             String::new()
         };
         format!(
-            "a thermal at ({:.0} ± {:.0}, {:.0} ± {:.0}) m at {:.0} s{moves}: {:.2} ± {:.2} m/s in the \
-             core, radius {:.0} ± {:.0} m, {:.0} ± {:.0} m³/s (95 %)",
-            x.value,
-            half(x),
-            y.value,
-            half(y),
+            "a thermal at ({}, {}) m at {:.0} s{moves}: {} m/s in the core, radius {} m, {} m³/s (95 %)",
+            interval(x),
+            interval(y),
             self.time_s,
-            self.peak_mps.value,
-            half(&self.peak_mps),
-            self.radius_m.value,
-            half(&self.radius_m),
-            self.flux_m3ps.value,
-            half(&self.flux_m3ps)
+            interval(&self.peak_mps),
+            interval(&self.radius_m),
+            interval(&self.flux_m3ps)
         )
     }
 }

@@ -30,9 +30,15 @@ impl Estimate {
 /// Prints the value to the digit that its error supports (two significant digits of the error).
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // What rounds to zero has no sign.
+        let rounded = |decimals: usize| {
+            let text = format!("{:.decimals$}", self.value);
+            let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+            if is_zero { text.replacen('-', "", 1) } else { text }
+        };
         match self.decimals() {
-            Some(decimals) => write!(f, "{:.decimals$} ± {:.decimals$}", self.value, self.se),
-            None => write!(f, "{:.3}", self.value),
+            Some(decimals) => write!(f, "{} ± {:.decimals$}", rounded(decimals), self.se),
+            None => write!(f, "{}", rounded(3)),
         }
     }
 }
@@ -47,5 +53,6 @@ mod tests {
         assert_eq!(Estimate::new(1546.46, 7.81).to_string(), "1546.5 ± 7.8");
         assert_eq!(Estimate::new(1546.46, 42.0).to_string(), "1546 ± 42");
         assert_eq!(Estimate::new(0.5, 0.0).to_string(), "0.500");
+        assert_eq!(Estimate::new(-0.003, 0.21).to_string(), "0.00 ± 0.21");
     }
 }

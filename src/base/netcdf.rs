@@ -60,10 +60,13 @@ impl NetcdfFile {
             };
             NcFile::from_storage_with_options(Arc::new(storage), options)
         };
-        let nc = open().map_err(|error: netcdf_reader::Error| NetcdfError::File {
+        let broken = |error: netcdf_reader::Error| NetcdfError::File {
             path: path.to_owned(),
             reason: said(&error),
-        })?;
+        };
+        let nc = open().map_err(broken)?;
+        // A file that is cut off can often be opened: what fails are its variables.
+        nc.variables().map_err(broken)?;
         Ok(Self { path: path.to_owned(), nc })
     }
 

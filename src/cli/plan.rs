@@ -69,10 +69,10 @@ pub(super) struct PlanArgs {
 struct AssumedArgs {
     /// Integral time of the vertical air speed over a drone that hovers, s [default: that of convective air at the flight's
     /// height in a wind of 3 m/s]
-    #[arg(long, value_name = "S", value_parser = integral_scale)]
+    #[arg(long, value_name = "S", value_parser = integral_scale, allow_negative_numbers = true)]
     integral_scale: Option<f64>,
     /// Standard deviation of the vertical air speed, m/s [default: that of convective air at the flight's height]
-    #[arg(long, value_name = "MPS", value_parser = air_sd)]
+    #[arg(long, value_name = "MPS", value_parser = air_sd, allow_negative_numbers = true)]
     air_sd: Option<f64>,
 }
 

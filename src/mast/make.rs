@@ -13,7 +13,7 @@ use super::record::MastRecord;
 use super::result::{
     Average, MAST_SCHEMA, MastComparison, MastDrone, MastFlight, MastSeries, Matched,
 };
-use super::{MastError, slow};
+use super::{MastError, doubts, slow};
 use crate::analysis::result::Analysis;
 use crate::base::frame::{Geodetic, ShowFrame};
 use crate::numeric;
@@ -88,6 +88,7 @@ pub fn compare(
             reasons,
         });
     }
+    let doubts = compared.iter().flat_map(doubts::of_flight).collect::<Vec<_>>();
     Ok(MastComparison {
         schema: MAST_SCHEMA.to_owned(),
         made_by: made_by.to_owned(),
@@ -97,7 +98,7 @@ pub fn compare(
         mast_step_s: mast.step_s,
         mast_mean_s: mast.slow_s,
         flights: compared,
-        notes: mast.notes.iter().cloned().chain(reasons).collect(),
+        notes: doubts.into_iter().chain(mast.notes.iter().cloned()).chain(reasons).collect(),
     })
 }
 

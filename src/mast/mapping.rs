@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::MastError;
+use super::heads::Heads;
 use crate::base::file::read_whole;
 use crate::base::parse;
 use crate::flight::table::{Channel, TimeColumn, TimeFormat, Wish};
@@ -14,12 +15,14 @@ const SCHEMA: &str = "updraft.mast/1";
 /// Largest description, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 /// Names by which columns are known without a description, in the order in which they are tried.
-const TIMES: [&str; 5] = ["utc", "time", "timestamp", "datetime", "date"];
-pub(super) const UP: [&str; 3] = ["w_mps", "w", "upward_air_velocity"];
+pub(super) const TIMES: [&str; 5] = ["utc", "time", "timestamp", "datetime", "date"];
+pub(super) const UP: [&str; 8] =
+    ["w_mps", "w", "upward_air_velocity", "uz", "w_avg", "uz_avg", "w_mean", "w_unrot"];
 pub(super) const EAST: [&str; 3] = ["u_mps", "u", "eastward_wind"];
 pub(super) const NORTH: [&str; 3] = ["v_mps", "v", "northward_wind"];
 pub(super) const UP_VARIANCE: [&str; 4] = ["w_variance", "w_var", "var_w", "variance_w"];
-pub(super) const UP_SD: [&str; 6] = ["w_sd", "w_std", "sd_w", "std_w", "sigma_w", "w_stddev"];
+pub(super) const UP_SD: [&str; 7] =
+    ["w_sd", "w_std", "sd_w", "std_w", "sigma_w", "w_stddev", "uz_std"];
 
 /// Which time of a mean its time in the record is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -97,35 +100,33 @@ impl MastMapping {
     ///
     /// # Errors
     /// If the columns of time and vertical air speed are not there.
-    pub fn of_heads(path: &Path, heads: &[String], first_time: &str) -> Result<Self, MastError> {
+    pub(super) fn of_heads(path: &Path, heads: &Heads) -> Result<Self, MastError> {
         let find = |names: &[&str]| {
             let called =
-                |name: &&str| heads.iter().position(|head| head.trim().eq_ignore_ascii_case(name));
-            names.iter().find_map(called).map(|index| heads[index].trim().to_owned())
+                |name: &&str| heads.names.iter().find(|head| head.eq_ignore_ascii_case(name));
+            names.iter().find_map(called).cloned()
         };
-        let need = |names: &[&str], what: &str| {
-            find(names).ok_or_else(|| MastError::Record {
-                path: path.to_owned(),
-                reason: format!(
-                    "no column with {what} ({}); describe the table in a TOML file (docs/mast.md) and give that",
-                    names.join(", ")
-                ),
-            })
+        let missing = |names: &[&str], what: &str| MastError::Record {
+            path: path.to_owned(),
+            reason: format!(
+                "no column with {what} ({}); the columns are: {}; describe the table in a TOML file (docs/mast.md) and give \
+                 that",
+                names.join(", "),
+                heads.listed()
+            ),
         };
-        let column = need(&TIMES, "times")?;
+        let time = heads.time.clone().ok_or_else(|| missing(&TIMES, "times"))?;
         let channel = |column: String| Channel { columns: vec![column], scale: 1.0, offset: 0.0 };
-        let w = channel(need(&UP, "the vertical air speed")?);
-        let is_number = first_time.trim().parse::<f64>().is_ok();
-        let format = if is_number { TimeFormat::S } else { TimeFormat::Datetime };
+        let w = find(&UP).ok_or_else(|| missing(&UP, "the vertical air speed"))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Self {
             schema: SCHEMA.to_owned(),
             name,
             file: path.to_owned(),
-            delimiter: ',',
-            time: Some(TimeColumn { column, format, utc_offset_h: Some(0.0) }),
+            delimiter: heads.delimiter,
+            time: Some(time),
             stamp: None,
-            w: Some(w),
+            w: Some(channel(w)),
             w_variance: find(&UP_VARIANCE).map(channel),
             w_sd: find(&UP_SD).filter(|_| find(&UP_VARIANCE).is_none()).map(channel),
             u: find(&EAST).map(channel),
@@ -134,13 +135,6 @@ impl MastMapping {
             longitude_deg: None,
             height_m: None,
         })
-    }
-
-    /// Column of times in a table with these heads.
-    pub(super) fn time_column(heads: &[String]) -> Option<usize> {
-        TIMES
-            .iter()
-            .find_map(|name| heads.iter().position(|head| head.trim().eq_ignore_ascii_case(name)))
     }
 
     /// A quantity by the name of its table: `w`, `u`, `v`, `w_variance`, `w_sd`.
@@ -163,28 +157,47 @@ impl MastMapping {
     ///
     /// # Errors
     /// [`MastError`]: the part that a table needs and the description does not say.
-    pub(super) fn wish(&self) -> Result<Wish<'_>, MastError> {
-        let missing = |key: &str| MastError::Record {
+    pub(super) fn wish(&self, heads: &Heads) -> Result<Wish<'_>, MastError> {
+        let time = self.time()?;
+        if self.w.is_none() {
+            return Err(self.missing("w"));
+        }
+        let Heads { line, first_line, .. } = *heads;
+        Ok(Wish { heads_line: line, first_line, ..self.wish_of(time) })
+    }
+
+    /// Column of times of a table.
+    ///
+    /// # Errors
+    /// As [`Self::wish`].
+    pub(super) fn time(&self) -> Result<&TimeColumn, MastError> {
+        self.time.as_ref().ok_or_else(|| self.missing("time"))
+    }
+
+    fn missing(&self, key: &str) -> MastError {
+        MastError::Record {
             path: self.file.clone(),
             reason: format!("it is a table, and the mapping has no [{key}] with its column"),
-        };
-        let time = self.time.as_ref().ok_or_else(|| missing("time"))?;
-        if self.w.is_none() {
-            return Err(missing("w"));
         }
-        Ok(self.wish_of(time))
     }
 
     fn wish_of<'a>(&'a self, time: &'a TimeColumn) -> Wish<'a> {
         // One mean of a slow mast is something to compare with.
-        Wish { delimiter: self.delimiter, time, channels: self.channels(), fewest_rows: 1 }
+        let (fewest_rows, heads_line, first_line) = (1, 1, 2);
+        let channels = self.channels();
+        Wish { delimiter: self.delimiter, time, channels, fewest_rows, heads_line, first_line }
     }
 
     fn refusal(&self) -> Option<String> {
         if self.schema != SCHEMA {
             return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
         }
-        let any = TimeColumn { column: String::new(), format: TimeFormat::S, utc_offset_h: None };
+        let any = TimeColumn {
+            column: String::new(),
+            time_of_day: None,
+            format: TimeFormat::S,
+            utc_offset_h: None,
+        };
         let time = self.time.as_ref().unwrap_or(&any);
         if let Some(reason) = self.wish_of(time).refusal() {
             return Some(reason);

@@ -4,6 +4,8 @@
 //! ([`make`]); a mast whose values are slower means is compared in those. Nothing is taken from the mast: neither a zero nor
 //! a scale.
 
+mod doubts;
+mod heads;
 pub mod make;
 pub mod mapping;
 pub mod matched;

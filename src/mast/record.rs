@@ -1,18 +1,17 @@
 //! The record of a mast: vertical air speed and wind at times in UTC.
 
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::MastError;
+use super::heads::{self, Heads};
 use super::mapping::{MastMapping, Stamp};
 use super::raw::Raw;
+use super::{MastError, doubts};
 use crate::base::file::{FileError, open_named};
 use crate::flight::Series;
 use crate::flight::table::read_columns;
 use crate::numeric::{median, rms};
 
-/// Longest first lines that are looked at for names of columns, bytes.
-const HEAD_BYTES: u64 = 64 << 10;
 /// Values that are further apart than this, or means over more, s, are compared mean by mean: drones are averaged over
 /// ten seconds.
 const SLOWEST_S: f64 = 5.0;
@@ -69,11 +68,15 @@ impl MastRecord {
             let raw = netcdf(file, mapping.as_ref(), near_m)?;
             return Self::of(raw, file, mapping.as_ref());
         }
-        let mapping = match mapping {
-            Some(mapping) => mapping,
-            None => by_heads(path)?,
+        let lines = heads::lines(file)?;
+        let (mapping, heads) = if let Some(mapping) = mapping {
+            let heads = Heads::described(&lines, mapping.delimiter, mapping.time()?);
+            (mapping, heads)
+        } else {
+            let heads = Heads::usual(&lines);
+            (MastMapping::of_heads(path, &heads)?, heads)
         };
-        Self::of(table(&mapping)?, &mapping.file, Some(&mapping))
+        Self::of(table(&mapping, &heads)?, &mapping.file, Some(&mapping))
     }
 
     fn of(raw: Raw, file: &Path, mapping: Option<&MastMapping>) -> Result<Self, MastError> {
@@ -85,6 +88,7 @@ impl MastRecord {
         }
         if let Some(variance) = &mut w_variance {
             left_out += take_out(variance, FASTEST_MPS.powi(2));
+            notes.extend(doubts::negative(variance));
         }
         if left_out > 0 {
             notes.push(format!(
@@ -103,6 +107,14 @@ impl MastRecord {
         let steps = w.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let step_s = median(steps).unwrap_or(f64::INFINITY);
         let mean_s = raw.mean_s.unwrap_or(step_s);
+        if !mean_s.is_finite() {
+            return Err(broken(
+                "it has one value of w alone, of which nobody knows over how long it is a mean: give more, or a NetCDF file \
+                 with bounds of its times"
+                    .to_owned(),
+            ));
+        }
+        notes.extend(doubts::of_times(&w, step_s, mean_s));
         let slow_s = (mean_s.max(step_s) > SLOWEST_S).then_some(mean_s);
         if let Some(mean_s) = slow_s {
             if mean_s > LONGEST_S {
@@ -130,7 +142,7 @@ impl MastRecord {
                 -0.5 * mean_s
             }
         };
-        if mean_s.is_finite() && later_s != 0.0 {
+        if later_s != 0.0 {
             let all =
                 std::iter::once(&mut w).chain(&mut w_variance).chain(wind.iter_mut().flatten());
             for series in all {
@@ -231,12 +243,13 @@ fn netcdf(
 }
 
 /// Reads a table.
-fn table(mapping: &MastMapping) -> Result<Raw, MastError> {
-    let columns = read_columns(&mapping.file, &mapping.wish()?)?;
+fn table(mapping: &MastMapping, heads: &Heads) -> Result<Raw, MastError> {
+    let columns = read_columns(&mapping.file, &mapping.wish(heads)?)?;
     let broken =
         |reason: &str| MastError::Record { path: mapping.file.clone(), reason: reason.to_owned() };
     let start = columns.start.ok_or_else(|| broken("its times are no dates"))?;
     let mut raw = Raw { zero_ms: start.to_unix_ms(), notes: columns.warnings, ..Raw::default() };
+    raw.notes.extend(heads.note());
     let (mut u, mut v) = (None, None);
     for (name, mut series) in columns.channels {
         match name {
@@ -252,22 +265,4 @@ fn table(mapping: &MastMapping) -> Result<Raw, MastError> {
     }
     raw.wind = u.zip(v).map(<[Series; 2]>::from);
     Ok(raw)
-}
-
-/// The description of a table by the names of its columns.
-fn by_heads(path: &Path) -> Result<MastMapping, MastError> {
-    let failed = |error| FileError::new("read", path, error);
-    let file = open_named(path).map_err(failed)?;
-    let mut lines = BufReader::new(file.take(HEAD_BYTES)).lines();
-    let mut next = || lines.next().transpose().map_err(failed).map(Option::unwrap_or_default);
-    let cells = |line: &str| -> Vec<String> {
-        line.trim_start_matches('\u{feff}')
-            .split(',')
-            .map(|cell| cell.trim_matches('"').to_owned())
-            .collect()
-    };
-    let heads = cells(&next()?);
-    let first = cells(&next()?);
-    let first_time = MastMapping::time_column(&heads).and_then(|index| first.get(index));
-    MastMapping::of_heads(path, &heads, first_time.map_or("", String::as_str))
 }

@@ -11,6 +11,11 @@ const LEAST_CORRELATION: f64 = 0.25;
 const FEWEST_PAIRS: usize = 6;
 /// Winds beyond are not looked for, m/s.
 const FASTEST_MPS: f64 = 40.0;
+/// A speed with a larger share of itself as standard error is not told from a pattern that stands.
+const LARGEST_SHARE: f64 = 0.5;
+/// Share of the lags' squares, weighted by correlation, that one velocity must explain: fields that are carried past reach 0.4 to 1, noise
+/// and waves that stand 0.15 at most (tests).
+const EXPLAINED: f64 = 0.25;
 
 /// Record at a place: metres east and north of anywhere.
 #[derive(Clone, Debug)]
@@ -32,7 +37,8 @@ pub struct DistanceClass {
     pub pairs: usize,
     /// Mean covariance without lag, (m/s)², with its errors: those of one pair, as pairs of one fleet are not independent.
     pub covariance: Moment,
-    /// Mean covariance at lags of 0, 1, ... steps of either sign, (m/s)².
+    /// Mean covariance at lags of 0, 1, ... steps of either sign, (m/s)²; at 0 that of [`DistanceClass::covariance`]. What the
+    /// means of the records took is added at all lags alike.
     pub by_lag: Vec<f64>,
 }
 
@@ -56,7 +62,11 @@ pub fn by_distance(
             let Some((moment, [later, earlier])) = one.covariance(other, lags, scale_se) else {
                 continue;
             };
-            let both = later.iter().zip(earlier).take(lags + 1).map(|(a, b)| 0.5 * (a + b));
+            let both = later
+                .iter()
+                .zip(earlier)
+                .take(lags + 1)
+                .map(|(a, b)| 0.5 * (a + b) + moment.systematic);
             let class = (distance_m / width_m) as u64;
             classes.entry(class).or_default().push((distance_m, moment, both.collect()));
         }
@@ -125,11 +135,12 @@ fn best_lag(a: &Record, b: &Record, most: usize) -> Option<(f64, f64)> {
 
 /// Velocity at which the pattern passes the points, by the lags at which pairs are most alike: a frozen pattern that is
 /// carried at `U` is most alike after `d · U / |U|²`. Pairs count by their correlation; the error is that of leaving out
-/// each point in turn (jackknife). `None` where too few pairs are alike, or the pattern stands.
+/// each point in turn (jackknife). `None` where too few pairs are alike, where no velocity explains most of the lags (noise, waves that
+/// stand), or where the pattern cannot be told from one that stands.
 pub fn advection(points: &[At<'_>], longest_s: f64) -> Option<Advection> {
     let step_s = points.first()?.record.step_s();
     let most = (longest_s / step_s) as usize;
-    let mut pairs = Vec::new();
+    let mut pairs: Vec<Alike> = Vec::new();
     for (i, one) in points.iter().enumerate() {
         for (j, other) in points.iter().enumerate().skip(i + 1) {
             let apart = [0, 1].map(|axis| other.place_m[axis] - one.place_m[axis]);
@@ -160,10 +171,27 @@ pub fn advection(points: &[At<'_>], longest_s: f64) -> Option<Advection> {
     let squares: f64 = without.iter().map(|value| (value - mean).powi(2)).sum();
     let speed_se_mps = ((count - 1.0) / count * squares).sqrt();
     // Without one of the points it would be another wind.
-    if speed_se_mps > 0.5 * speed(velocity_mps) {
+    if speed_se_mps > LARGEST_SHARE * speed(velocity_mps)
+        || explained(&pairs, velocity_mps) < EXPLAINED
+    {
         return None;
     }
     Some(Advection { velocity_mps, speed_se_mps, pairs: pairs.len() })
+}
+
+/// Two points, their distance along each axis, m, the lag at which they are most alike, s, and the correlation there.
+type Alike = (usize, usize, [f64; 2], f64, f64);
+
+/// Share of the lags' squares that a velocity explains, pairs weighted by their correlation.
+fn explained(pairs: &[Alike], [x, y]: [f64; 2]) -> f64 {
+    let square = x * x + y * y;
+    let (mut left, mut all) = (0.0, 0.0);
+    for (_, _, apart, lag_s, correlation) in pairs {
+        let expected_s = (apart[0] * x + apart[1] * y) / square;
+        left += correlation.powi(2) * (lag_s - expected_s).powi(2);
+        all += correlation.powi(2) * lag_s.powi(2);
+    }
+    1.0 - left / all
 }
 
 /// Velocity whose slowness explains lags over distances; outliers, as of pairs that are alike by chance, count less.

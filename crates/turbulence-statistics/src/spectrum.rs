@@ -234,6 +234,10 @@ pub fn mean(records: &[&Record], instrument: &Instrument) -> Vec<Band> {
     let count = records.len();
     let Some(first) = records.first() else { return Vec::new() };
     let sums = sums(records, instrument);
+    // Stretches between gaps may all be too short.
+    if sums.is_empty() {
+        return Vec::new();
+    }
     let density = |sum: &Sum| {
         let own = |i: usize| sum.products[i * count + i].re / sum.lines;
         (0..count).map(own).sum::<f64>() / count as f64

@@ -80,6 +80,7 @@ fn covariances_between_points_are_those_of_the_field() {
             // The mean of the classes' pairs.
             let truth = sd_mps.powi(2) * (-class.distance_m / length_m).exp();
             off.push((class.covariance.value - truth).abs());
+            assert!((class.by_lag[0] - class.covariance.value).abs() < 1e-12, "one definition");
             inside.1 += 1;
             inside.0 +=
                 usize::from(class.covariance.low <= truth && truth <= class.covariance.high);
@@ -122,6 +123,36 @@ fn the_wind_is_found_by_what_it_carries() {
     let apart: Vec<_> =
         (0..16).map(|k| fleet(100 + k, 0.5, 40.0, [3.0, 1.0]).swap_remove(k as usize)).collect();
     assert_eq!(advection(&points(&apart), 60.0), None);
+}
+
+/// A pattern that does not move has no speed: waves that stand with noise, and noise alone that lasts for seconds.
+#[test]
+fn nothing_that_stands_has_a_speed() {
+    let mut told = [0, 0];
+    for seed in 0..40_u64 {
+        let mut random = Pcg64::seed_from_u64(900 + seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        let place = |k: usize| [10.0 * (k % 5) as f64, 10.0 * (k / 5) as f64];
+        let mut fleet = |wave_mps: f64| -> Vec<([f64; 2], Record)> {
+            let each = |k: usize| {
+                let at = place(k);
+                let here = wave_mps * (std::f64::consts::TAU * at[0] / 60.0).sin();
+                let mut noise = 0.0;
+                let value = |step: usize| {
+                    // Ten seconds, as the means of a map.
+                    noise = 0.95 * noise + 0.05 * draw();
+                    let turned = std::f64::consts::TAU * step as f64 * STEP_S / 40.0;
+                    Some(here * turned.sin() + noise)
+                };
+                (at, Record::new(STEP_S, (0..600).map(value)))
+            };
+            (0..25).map(each).collect()
+        };
+        for (told, wave_mps) in told.iter_mut().zip([0.0, 0.3]) {
+            *told += usize::from(advection(&points(&fleet(wave_mps)), 37.5).is_some());
+        }
+    }
+    assert_eq!(told, [0, 0], "noise, standing waves");
 }
 
 #[test]

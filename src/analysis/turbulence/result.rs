@@ -206,7 +206,7 @@ pub struct AtDistance {
     /// Covariance over the fleet's variance; absent where that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
-    /// Mean covariance at lags of 0, 1, ... s of either sign, (m/s)².
+    /// Mean covariance at lags of 0, 1, ... s of either sign, (m/s)²; at 0 that of `covariance`.
     pub by_lag: Vec<f64>,
     /// Mean squared coherence of the pairs, by frequency.
     pub coherence: Vec<CoherentBand>,

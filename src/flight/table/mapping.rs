@@ -61,11 +61,13 @@ pub struct Mapping {
 pub struct TimeColumn {
     /// Name of the column of times.
     pub column: String,
+    /// Column of the times of day, where `column` has the dates alone.
+    pub time_of_day: Option<String>,
     /// Format of the times.
     #[serde(default)]
     pub format: TimeFormat,
-    /// Local time of the column less UTC, h; 0: it is UTC. With it numbers count since 1970. Absent: only dates that
-    /// end in Z are known to be UTC, and numbers count since any instant.
+    /// Local time of the column less UTC, h; 0: it is UTC. With it numbers count since 1970. Absent: only dates with a
+    /// zone (Z, +01:00) are known in UTC, and numbers count since any instant. The zone of a date goes before it.
     pub utc_offset_h: Option<f64>,
 }
 
@@ -80,6 +82,8 @@ pub enum TimeFormat {
     Ms,
     /// Microseconds since any instant.
     Us,
+    /// Nanoseconds since any instant.
+    Ns,
     /// Date and time of day, as `2021-04-20 09:29:26.100`, with a blank or a T.
     Datetime,
 }
@@ -171,6 +175,8 @@ impl Mapping {
             time: &self.time,
             channels: self.channels(),
             fewest_rows: FEWEST_ROWS,
+            heads_line: 1,
+            first_line: 2,
         }
     }
 

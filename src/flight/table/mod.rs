@@ -14,8 +14,9 @@ use crate::base::plain::Shown as _;
 
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
 #[cfg(feature = "netcdf-input")]
-pub(crate) use time::seconds_of;
+pub(crate) use time::{date_time, zoned};
 
+pub(crate) use read::time_of;
 pub use read::{Columns, Wish, read, read_columns, read_from};
 
 /// Error of reading a flight from tables.

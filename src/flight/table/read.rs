@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 use std::cell::Cell;
-use std::io::{self, Read};
+use std::io::{self, BufRead as _, BufReader, Read};
 use std::path::Path;
 
 use super::TableError;
 use super::mapping::{Channel, Mapping, TimeColumn, TimeFormat};
-use super::time::seconds_of;
+use super::time::date_time;
 use crate::base::file::{FileError, open_named};
 use crate::base::plain::plain;
 use crate::base::time::GpsTime;
@@ -74,6 +74,10 @@ pub struct Wish<'a> {
     pub channels: Vec<(&'static str, &'a Channel)>,
     /// Fewest rows that are enough.
     pub fewest_rows: usize,
+    /// Line with the names of the columns, counted from 1.
+    pub heads_line: u64,
+    /// First line of values: those between are not read.
+    pub first_line: u64,
 }
 
 impl Wish<'_> {
@@ -89,6 +93,9 @@ impl Wish<'_> {
             if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
                 return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
             }
+        }
+        if self.time.time_of_day.is_some() && self.time.format != TimeFormat::Datetime {
+            return Some("time: time_of_day is for format = \"datetime\"".to_owned());
         }
         let zone_h = self.time.utc_offset_h;
         if zone_h.is_some_and(|h| !(h.is_finite() && h.abs() <= FURTHEST_ZONE_H)) {
@@ -164,7 +171,15 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
 
 fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Columns, TableError> {
     let since_row = Cell::new(0);
-    let bytes = Bounded { inner: bytes, since_row: &since_row };
+    let mut bytes = BufReader::new(Bounded { inner: bytes, since_row: &since_row });
+    let before = wish.heads_line.saturating_sub(1);
+    for _ in 0..before {
+        since_row.set(0);
+        bytes.skip_until(b'\n').map_err(|error| TableError::Row {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })?;
+    }
     let mut reader =
         csv::ReaderBuilder::new().delimiter(wish.delimiter as u8).flexible(true).from_reader(bytes);
     let broken =
@@ -175,6 +190,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
         path,
         time: wish.time,
         table,
+        lines_before: before,
         first: None,
         start: None,
         last_s: f64::NEG_INFINITY,
@@ -185,6 +201,10 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
     let mut cut_off: Option<TableError> = None;
     while rows.taken < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
         since_row.set(0);
+        let line = row.position().map_or(0, csv::Position::line) + before;
+        if line < wish.first_line {
+            continue;
+        }
         // A row with another number of cells is only forgiven as the last one.
         if let Some(error) = cut_off {
             return Err(error);
@@ -192,9 +212,9 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
         if row.len() == heads.len() {
             rows.take(&row)?;
         } else {
-            let line = row.position().map_or(0, csv::Position::line);
+            let heads_line = if before == 0 { "the first line" } else { "that of the names" };
             let reason =
-                format!("line {line} has {} cells, the first line {}", row.len(), heads.len());
+                format!("line {line} has {} cells, {heads_line} {}", row.len(), heads.len());
             cut_off = Some(TableError::Row { path: path.to_owned(), reason });
         }
     }
@@ -208,6 +228,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
 /// Where a table's columns are.
 struct Places<'a> {
     time: usize,
+    time_of_day: Option<usize>,
     /// Each channel by its name.
     channels: Vec<(&'static str, Wanted<'a>)>,
 }
@@ -228,6 +249,8 @@ impl<'a> Places<'a> {
             })
         };
         let time = find(&wish.time.column, "time")?;
+        let time_of_day = wish.time.time_of_day.as_ref();
+        let time_of_day = time_of_day.map(|column| find(column, "time_of_day")).transpose()?;
         let mut channels = Vec::new();
         for &(name, channel) in &wish.channels {
             let columns: Result<Vec<_>, TableError> = channel
@@ -238,7 +261,7 @@ impl<'a> Places<'a> {
             let (columns, series) = (columns?, Series::default());
             channels.push((name, Wanted { channel, columns, series, left_out: 0 }));
         }
-        Ok(Self { time, channels })
+        Ok(Self { time, time_of_day, channels })
     }
 }
 
@@ -247,6 +270,8 @@ struct Rows<'a> {
     path: &'a Path,
     time: &'a TimeColumn,
     table: Places<'a>,
+    /// Lines of the file before that of the names.
+    lines_before: u64,
     /// Time of the first row, s: show time counts from it.
     first: Option<f64>,
     /// GPS time of the first row, if the table says.
@@ -262,16 +287,20 @@ impl Rows<'_> {
     fn take(&mut self, row: &csv::StringRecord) -> Result<(), TableError> {
         let cell = |column: &str, reason: String| TableError::Cell {
             path: self.path.to_owned(),
-            line: row.position().map_or(0, csv::Position::line),
+            line: row.position().map_or(0, csv::Position::line) + self.lines_before,
             column: column.to_owned(),
             reason,
         };
         let time = self.time;
-        let text = row.get(self.table.time).unwrap_or_default();
-        let time_s = time_of(text, time.format)
-            .ok_or_else(|| cell(&time.column, format!("\"{}\" is not a time", short(text))))?;
-        if self.first.is_none() {
-            self.start = start(time, text, time_s);
+        let date = row.get(self.table.time).unwrap_or_default();
+        let text = match self.table.time_of_day.and_then(|index| row.get(index)) {
+            Some(clock) => Cow::Owned(format!("{} {}", date.trim(), clock.trim())),
+            None => Cow::Borrowed(date),
+        };
+        let (time_s, is_utc) = time_of(&text, time)
+            .ok_or_else(|| cell(&time.column, format!("\"{}\" is not a time", short(&text))))?;
+        if self.first.is_none() && is_utc {
+            self.start = GpsTime::from_unix_ms((time_s * 1000.0).round() as i64);
         }
         let show_s = time_s - *self.first.get_or_insert(time_s);
         if show_s <= self.last_s {
@@ -349,22 +378,23 @@ fn holes(name: &str, one: &Wanted<'_>) -> Option<String> {
     })
 }
 
-fn time_of(text: &str, format: TimeFormat) -> Option<f64> {
+/// Seconds that a cell stands for, and whether they are known to be UTC since 1970.
+pub(crate) fn time_of(text: &str, time: &TimeColumn) -> Option<(f64, bool)> {
     let number = || text.trim().parse::<f64>().ok();
-    let time_s = match format {
+    let mut zone_s = time.utc_offset_h.map(|hours| hours * 3600.0);
+    let local_s = match time.format {
         TimeFormat::S => number()?,
         TimeFormat::Ms => number()? / 1e3,
         TimeFormat::Us => number()? / 1e6,
-        TimeFormat::Datetime => seconds_of(text)?,
+        TimeFormat::Ns => number()? / 1e9,
+        TimeFormat::Datetime => {
+            let found = date_time(text)?;
+            zone_s = found.zone_s.or(zone_s);
+            found.local_s
+        }
     };
-    (time_s.abs() <= LATEST_S).then_some(time_s)
-}
-
-/// GPS time of a cell with a time that is known to be UTC or how far from it, s.
-fn start(time: &TimeColumn, text: &str, time_s: f64) -> Option<GpsTime> {
-    let is_utc = time.format == TimeFormat::Datetime && text.trim().ends_with('Z');
-    let offset_h = if is_utc { 0.0 } else { time.utc_offset_h? };
-    GpsTime::from_unix_ms(((time_s - offset_h * 3600.0) * 1000.0).round() as i64)
+    let time_s = local_s - zone_s.unwrap_or(0.0);
+    (time_s.abs() <= LATEST_S).then_some((time_s, zone_s.is_some()))
 }
 
 /// Heights above the first one.

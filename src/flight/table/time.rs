@@ -1,12 +1,55 @@
 //! Dates with times of day, in seconds.
 
-/// Seconds since 1970 of `2021-04-20 09:29:26.100` (with a blank or a T, perhaps a Z at the end); the
-/// proleptic Gregorian calendar without leap seconds. `None`: it is none.
-pub(crate) fn seconds_of(text: &str) -> Option<f64> {
-    let text = text.trim().trim_end_matches('Z');
-    let (date, time) = text.split_once([' ', 'T'])?;
+/// Date and time of day.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct DateTime {
+    /// Seconds since 1970, as the clock of its zone shows them.
+    pub(crate) local_s: f64,
+    /// The zone's clock less UTC, s, where the text says (Z: 0).
+    pub(crate) zone_s: Option<f64>,
+}
+
+/// `2021-04-20 09:29:26.100`, with a blank or a T, perhaps without seconds, perhaps with a zone (`Z`, `+01:00`, `+0100`,
+/// `+01`); the proleptic Gregorian calendar without leap seconds. `None`: it is none.
+pub(crate) fn date_time(text: &str) -> Option<DateTime> {
+    let (date, time) = text.trim().split_once([' ', 'T'])?;
+    let (time, zone_s) = zoned(time.trim())?;
+    Some(DateTime { local_s: seconds_of(date, time)?, zone_s })
+}
+
+/// Time of day without its zone, and what the zone's clock is ahead of UTC, s, if it is told: `Z`, `UTC`, `+01:00`,
+/// `+0100`, `+1`. `None`: what follows is no zone.
+pub(crate) fn zoned(time: &str) -> Option<(&str, Option<f64>)> {
+    for utc in ["z", "utc", "gmt"] {
+        let at = time.len().saturating_sub(utc.len());
+        if time.get(at..).is_some_and(|end| end.eq_ignore_ascii_case(utc)) {
+            return Some((time.get(..at)?.trim_end(), Some(0.0)));
+        }
+    }
+    let Some(at) = time.find(['+', '-']) else { return Some((time, None)) };
+    let (time, zone) = time.split_at(at);
+    let sign = if zone.starts_with('-') { -1.0 } else { 1.0 };
+    let digits = zone.get(1..)?.trim();
+    let (hours, minutes) = match digits.split_once(':') {
+        Some(parts) => parts,
+        None if digits.len() == 4 && digits.is_ascii() => digits.split_at(2),
+        None => (digits, "0"),
+    };
+    let number = |text: &str| {
+        let is_number =
+            matches!(text.len(), 1 | 2) && text.bytes().all(|byte| byte.is_ascii_digit());
+        text.parse::<f64>().ok().filter(|_| is_number)
+    };
+    let (hours, minutes) = (number(hours)?, number(minutes)?);
+    let is_zone = hours <= 14.0 && minutes < 60.0;
+    is_zone.then_some((time.trim_end(), Some(sign * (hours * 3600.0 + minutes * 60.0))))
+}
+
+fn seconds_of(date: &str, time: &str) -> Option<f64> {
     let [year, month, day] = three(date, '-')?;
-    let [hour, minute, second] = three(time, ':')?;
+    let with_seconds = time.matches(':').count() > 1;
+    let [hour, minute, second] =
+        if with_seconds { three(time, ':')? } else { three(&format!("{time}:0"), ':')? };
     let whole = [year, month, day, hour, minute];
     if whole.iter().any(|part| part.fract() != 0.0) {
         return None;
@@ -41,7 +84,11 @@ fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    use super::seconds_of;
+    use super::{DateTime, date_time};
+
+    fn seconds_of(text: &str) -> Option<f64> {
+        date_time(text).map(|found| found.local_s)
+    }
 
     #[test]
     fn dates_are_seconds_since_1970() {
@@ -56,8 +103,30 @@ mod tests {
             "a-b-c d:e:f",
             "1-1-1 1:1:1:1",
             "2021-04-20 -1:00:00",
+            "2021-04-20 12",
+            "2021-04-20 12:00:00+99:00",
+            "2021-04-20 12:00:00+01:00:00",
+            "2021-04-20 12:00:00 +é1",
         ] {
             assert_eq!(seconds_of(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn zones_are_told_as_people_and_programs_write_them() {
+        let noon_s = 1_618_920_000.0;
+        for (text, zone_s) in [
+            ("2021-04-20 12:00", None),
+            ("2021-04-20 12:00:00Z", Some(0.0)),
+            ("2021-04-20T12:00:00z", Some(0.0)),
+            ("2021-04-20 12:00:00+00:00", Some(0.0)),
+            ("2021-04-20 12:00:00.000+02:00", Some(7200.0)),
+            ("2021-04-20 12:00:00 -0930", Some(-34_200.0)),
+            ("2021-04-20T12:00+01", Some(3600.0)),
+            ("2021-04-20 12:00:00 UTC", Some(0.0)),
+            ("2021-04-20 12:00:00 -5", Some(-18_000.0)),
+        ] {
+            assert_eq!(date_time(text), Some(DateTime { local_s: noon_s, zone_s }), "{text}");
         }
     }
 }

@@ -270,9 +270,11 @@ impl Reader<'_> {
                     TimeFormat::S => 1.0,
                     TimeFormat::Ms => 1e-3,
                     TimeFormat::Us => 1e-6,
+                    TimeFormat::Ns => 1e-9,
                     TimeFormat::Datetime => {
                         return Err(wrong(
-                            "times of a NetCDF file are numbers: format is s, ms or us".to_owned(),
+                            "times of a NetCDF file are numbers: format is s, ms, us or ns"
+                                .to_owned(),
                         ));
                     }
                 };

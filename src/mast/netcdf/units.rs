@@ -1,6 +1,6 @@
 //! Units of times and speeds, as the CF conventions write them.
 
-use crate::flight::table::seconds_of;
+use crate::flight::table::{date_time, zoned};
 
 /// First year in which the standard calendar is the Gregorian one throughout.
 const GREGORIAN: &str = "1583";
@@ -62,32 +62,15 @@ pub(super) fn since(units: &str, calendar: Option<&str>) -> Result<Since, String
             ));
         }
     }
-    let (time, zone) = zoned(time).ok_or_else(wrong)?;
+    let (time, zone_s) = zoned(time).ok_or_else(wrong)?;
     let time = match time.matches(':').count() {
         _ if time.is_empty() => "00:00:00".to_owned(),
         0 => format!("{time}:00:00"),
         1 => format!("{time}:00"),
         _ => time.to_owned(),
     };
-    let local_s = seconds_of(&format!("{date} {time}")).ok_or_else(wrong)?;
-    Ok(Since { unit_s, zero_s: local_s - zone })
-}
-
-/// A time of day and its zone east of UTC, s.
-fn zoned(text: &str) -> Option<(&str, f64)> {
-    let text = text.trim_end_matches("utc").trim_end_matches("gmt").trim_end_matches('z').trim();
-    let Some(at) = text.find(['+', '-']) else { return Some((text, 0.0)) };
-    let (time, zone) = text.split_at(at);
-    let sign = if zone.starts_with('-') { -1.0 } else { 1.0 };
-    let digits = zone[1..].trim();
-    let (hours, minutes) = match digits.split_once(':') {
-        Some(parts) => parts,
-        None if digits.len() == 4 && digits.is_ascii() => digits.split_at(2),
-        None => (digits, "0"),
-    };
-    let (hours, minutes): (f64, f64) = (hours.parse().ok()?, minutes.parse().ok()?);
-    let valid = (0.0..=14.0).contains(&hours) && (0.0..60.0).contains(&minutes);
-    valid.then_some((time.trim(), sign * (hours * 3600.0 + minutes * 60.0)))
+    let local_s = date_time(&format!("{date} {time}")).ok_or_else(wrong)?.local_s;
+    Ok(Since { unit_s, zero_s: local_s - zone_s.unwrap_or(0.0) })
 }
 
 /// Factor to m/s; `None`: the unit is not known.

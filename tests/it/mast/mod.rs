@@ -5,6 +5,7 @@
 #[cfg(all(feature = "netcdf", feature = "netcdf-input"))]
 mod netcdf;
 mod slow;
+mod tables;
 
 use std::fmt::Write as _;
 use std::fs;
