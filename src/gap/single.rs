@@ -3,10 +3,12 @@
 
 use std::ops::RangeInclusive;
 
+use nalgebra::DMatrix;
+
 use super::candidates::set;
 use super::contest::PRODUCT_NATS;
-use super::decide::{CONTEST_MARGINS, margin_nats};
-use super::dependence::{Dependence, depend_on_the_same, signals_of};
+use super::decide::{ALIKE, CONTEST_MARGINS, margin_nats};
+use super::dependence::{Dependence, depend_on_the_same, is_of_air, signals_of};
 use super::error::GapError;
 use super::explain::Found;
 use super::generic::climb_shapes;
@@ -14,7 +16,7 @@ use super::gls::{Problem, Split};
 use super::refine::{self, Parameter, half_interval};
 use super::search::FREE_FLOOR_NATS;
 use super::verdict::{Finding, Rest, Rival, Step};
-use crate::effects::{Role, Signal};
+use crate::effects::{Role, Signal, find};
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
 const AT_BOUND: f64 = 1e-3;
@@ -38,8 +40,10 @@ const CLIMB_ORDERS: RangeInclusive<usize> = 1..=5;
 pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     at_their_bounds(found);
     beside_a_curve(found)?;
+    beside_its_like(found)?;
     beside_something_unknown(&mut found.steps);
     beside_something_larger(&mut found.steps);
+    beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
     Ok(())
 }
@@ -75,6 +79,57 @@ fn gains(found: &Found, size: usize) -> Result<[f64; 2], GapError> {
     let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
     let solution = problem.with(&sizes).at(&found.hyper);
     Ok([solution.gain(&own).nats, solution.gain_of_all(&curves).1])
+}
+
+/// Names of two effects that depend on the same and leave similar traces with everything else free: the second may be no
+/// more than what the form of the first leaves over.
+fn beside_its_like(found: &mut Found) -> Result<(), GapError> {
+    let place_of = |step: &Step| {
+        let first = step.finding.effects().first().copied()?;
+        found.parameters.iter().position(|parameter| parameter.effect == first)
+    };
+    let sizes: Vec<Option<usize>> = found.steps.iter().map(place_of).collect();
+    // In what another program simulated, sets of effects were held against sets that do as well.
+    if sizes.iter().flatten().count() < 2 || found.comparison.is_foreign() {
+        return Ok(());
+    }
+    let correlations = correlations(found)?;
+    let mut alike: Vec<(usize, String)> = Vec::new();
+    for (step, own) in sizes.iter().enumerate() {
+        let Some(own) = *own else { continue };
+        let others = sizes.iter().flatten().filter(|other| {
+            let (one, another) = (found.parameters[own].effect, found.parameters[**other].effect);
+            one != another
+                && depend_on_the_same(one, another)
+                && correlations[(own, **other)].abs() > ALIKE
+        });
+        let others = others.map(|other| found.parameters[*other].effect.to_owned());
+        alike.extend(others.map(|other| (step, other)));
+    }
+    for place in 0..found.steps.len() {
+        let Some(effect) = new_name(&found.steps[place]).map(str::to_owned) else { continue };
+        let others = alike.iter().filter(|(of, name)| *of == place && *name != effect);
+        let others: Vec<String> = others.map(|(_, name)| name.clone()).collect();
+        doubt(&mut found.steps[place], others);
+    }
+    Ok(())
+}
+
+/// Correlations of the errors of all sizes, with everything else free.
+fn correlations(found: &Found) -> Result<DMatrix<f64>, GapError> {
+    let Found { comparison, vehicle, parameters, gusts_mps, .. } = found;
+    let patterns = comparison.patterns(vehicle, *gusts_mps)?;
+    let residual = Split::of(&comparison.residual(vehicle, *gusts_mps)?);
+    let doubts = refine::doubts(comparison, vehicle, parameters)?;
+    let sizes = refine::slopes(comparison, vehicle, parameters)?;
+    let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
+    let covariance = problem.with(&sizes).at(&found.hyper).covariance();
+    let first = covariance.nrows() - sizes.len();
+    let sd = |size: usize| covariance[(first + size, first + size)].max(0.0).sqrt();
+    Ok(DMatrix::from_fn(sizes.len(), sizes.len(), |one, other| {
+        let both = sd(one) * sd(other);
+        if both > 0.0 { covariance[(first + one, first + other)] / both } else { 0.0 }
+    }))
 }
 
 /// An effect that is named alone, and was not in the model.
@@ -167,17 +222,33 @@ fn beside_something_larger(steps: &mut [Step]) {
     }
 }
 
-/// Names beside a free shape that is left and depends on the same: an effect is named alone only if it leaves nothing of
-/// its kind. What is left may be no finding because only the scatter between drones shows it.
+/// Motions of the air: no vehicle lacks them, and they can stand for what a model lacks. They are told with what explains
+/// most beside them, of whatever kind, or else with something unknown that depends on the height as they do.
+fn beside_what_the_air_may_be(steps: &mut [Step]) {
+    for step in steps {
+        let Some(motion) = new_name(step).filter(|name| find(name).is_none()) else { continue };
+        let motion = motion.to_owned();
+        let best = step.rivals.iter().find(|rival| rival.name != motion);
+        let height = || Dependence::Height.name().to_owned();
+        let other = best.map_or_else(height, |rival| rival.name.clone());
+        doubt(step, [other]);
+    }
+}
+
+/// Names beside a free shape that is left above its threshold, depends on the same and explains a fair share of what the
+/// name does: an effect is named alone only if it leaves nothing of its kind. What is left may be no finding because it
+/// hardly matters, or because only the scatter between drones shows it.
 fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
-    if rest.gain_nats <= FREE_FLOOR_NATS {
+    if rest.gain_nats <= FREE_FLOOR_NATS.max(rest.threshold_nats) {
         return;
     }
     for step in steps {
         let Some(effect) = new_name(step) else { continue };
-        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
-        let other = alike && rest.gain_nats > UNKNOWN_SHARE * step.gain_nats;
+        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal))
+            // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
+            || depends_on.is_of_air() && is_of_air(effect);
+        let other = alike && rest.gain_nats > RIVAL_SHARE * step.gain_nats;
         doubt(step, other.then(|| depends_on.name().to_owned()));
     }
 }
@@ -271,6 +342,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_by_the_form_of_its_like_is_not_named_alone() {
+        let data = trial::data(3, |_, _| 0.0);
+        let of = |one: (&str, &str), other: (&str, &str)| {
+            let mut found = Found::nothing(trial::comparison(&data));
+            let both = [one, other];
+            found.steps = both.map(|(effect, _)| step(name(effect), 60.0, 9.0, &[])).to_vec();
+            found.parameters =
+                both.iter().filter_map(|(effect, size)| size_of(effect, size)).collect();
+            found.values = vec![(0.5, 0.1); 2];
+            beside_its_like(&mut found).unwrap();
+            told(&found.steps)
+        };
+        let drag = ("face-drag", "top");
+        let alike = of(drag, ("thrust-curve", "expo"));
+        assert_eq!(alike, ["face-drag thrust-curve", "thrust-curve face-drag"]);
+        assert_eq!(of(drag, ("rotor-inflow", "inflow_share")), ["face-drag", "rotor-inflow"]);
+        let warming = of(drag, ("motor-thermal", "drift_us"));
+        assert_eq!(warming, ["face-drag", "motor-thermal"], "it depends on something else");
+    }
+
+    #[test]
     fn what_is_beside_something_unknown_is_not_named_alone() {
         let of = |first: Finding, gain_nats: f64, then: Finding| {
             let mut steps = vec![step(first, gain_nats, 9.0, &[]), step(then, 50.0, 9.0, &[])];
@@ -303,6 +395,19 @@ mod tests {
     }
 
     #[test]
+    fn a_motion_of_the_air_is_never_named_alone() {
+        let of = |effect: &str, rivals: &[&str]| {
+            let mut steps = [step(name(effect), 28.0, 9.0, rivals)];
+            beside_what_the_air_may_be(&mut steps);
+            told(&steps).concat()
+        };
+        let seen = ["updraft-profile", "climb", "height"];
+        assert_eq!(of("updraft-profile", &seen), "updraft-profile climb");
+        assert_eq!(of("updraft-profile", &[]), "updraft-profile height");
+        assert_eq!(of("battery", &seen), "battery", "an effect of the vehicle");
+    }
+
+    #[test]
     fn what_a_shape_is_left_beside_has_the_rivals_of_that_kind() {
         let free = step(unknown(Dependence::Climb), 30.0, 9.0, &[]);
         let mut steps = vec![step(name("face-drag"), 15.0, 9.0, &["vortex-ring", "battery"])];
@@ -329,9 +434,10 @@ mod tests {
             beside_what_is_left(&mut steps, &Rest { gain_nats, candidate, ..Rest::default() });
             told(&steps).concat()
         };
-        let told_with = |candidate: &str, gain_nats: f64| with(40.0, candidate, gain_nats);
+        let told_with = |candidate: &str, gain_nats: f64| with(80.0, candidate, gain_nats);
         assert_eq!(told_with("climb", 20.0), "face-drag");
         assert_eq!(told_with("climb", 20.0 + 1e-9), "face-drag climb");
+        assert_eq!(told_with("wind", 20.0 + 1e-9), "face-drag wind", "a body feels the whole air");
         assert_eq!(told_with("voltage", 90.0), "face-drag", "a drag has no battery");
         assert_eq!(told_with("rotor-inflow", 90.0), "face-drag", "an effect is none of them");
         assert_eq!(with(10.0, "climb", 14.0), "face-drag", "not above what chance gains");
