@@ -507,8 +507,13 @@ impl Search<'_> {
             found.extras.push(variant.column.clone());
             found.hyper = best.hyper;
         }
+        // In what another program simulated, sets of effects were held against sets that do as well.
+        let is_set = comparison.is_foreign();
+        let form = single::form_of_what_was_found(&found.steps, candidate.name, best.plain);
+        let mut names = with_alike(names, candidate);
+        names.extend(form.filter(|form| !is_set && !names.contains(form)));
         found.steps.push(Step {
-            finding: finding(with_alike(names, candidate), candidate.was_there, by_lean),
+            finding: finding(names, candidate.was_there, by_lean),
             gain_nats: best.gain,
             threshold_nats,
             alpha: self.options.alpha,

@@ -334,6 +334,7 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
 #[cfg(test)]
 mod tests {
     use super::super::trial;
+    use super::super::verdict::Shrink;
     use super::*;
     use crate::flight::{Flight, Series};
     use crate::gap::bins::BinValues;
@@ -414,9 +415,7 @@ mod tests {
         let us = |value: f64| Interval { value, low: value, high: value };
         let gap = |after_us: f64| {
             let (before_us, after_us) = (us(20.0), us(after_us));
-            let drones =
-                Some(super::super::verdict::Shrink { before_us, after_us, ..<_>::default() });
-            Gap { drones, rungs: None }
+            Gap { drones: Some(Shrink { before_us, after_us, ..Shrink::default() }), rungs: None }
         };
         let late = SensorChannel { named: true, ..SensorChannel::default() };
         assert!(is_only_in_log(&late, &gap(20.3)), "1.5 % more");

@@ -3,11 +3,9 @@
 
 use std::ops::RangeInclusive;
 
-use nalgebra::DMatrix;
-
 use super::candidates::set;
 use super::contest::PRODUCT_NATS;
-use super::decide::{ALIKE, CONTEST_MARGINS, margin_nats};
+use super::decide::{CONTEST_MARGINS, margin_nats};
 use super::dependence::{Dependence, depend_on_the_same, is_of_air, signals_of};
 use super::error::GapError;
 use super::explain::Found;
@@ -40,7 +38,6 @@ const CLIMB_ORDERS: RangeInclusive<usize> = 1..=5;
 pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     at_their_bounds(found);
     beside_a_curve(found)?;
-    beside_its_like(found)?;
     beside_something_unknown(&mut found.steps);
     beside_something_larger(&mut found.steps);
     beside_what_the_air_may_be(&mut found.steps);
@@ -81,55 +78,15 @@ fn gains(found: &Found, size: usize) -> Result<[f64; 2], GapError> {
     Ok([solution.gain(&own).nats, solution.gain_of_all(&curves).1])
 }
 
-/// Names of two effects that depend on the same and leave similar traces with everything else free: the second may be no
-/// more than what the form of the first leaves over.
-fn beside_its_like(found: &mut Found) -> Result<(), GapError> {
-    let place_of = |step: &Step| {
-        let first = step.finding.effects().first().copied()?;
-        found.parameters.iter().position(|parameter| parameter.effect == first)
-    };
-    let sizes: Vec<Option<usize>> = found.steps.iter().map(place_of).collect();
-    // In what another program simulated, sets of effects were held against sets that do as well.
-    if sizes.iter().flatten().count() < 2 || found.comparison.is_foreign() {
-        return Ok(());
+/// What an effect is told with that was found after others, and gains so much in the means, nats: the first of those that
+/// depends on the same, unless the means alone would show a free shape. By less it may be what the form of that one leaves,
+/// which no library has exactly, however well the drones scatter for it.
+pub(super) fn form_of_what_was_found(steps: &[Step], effect: &str, plain: f64) -> Option<String> {
+    if plain > FREE_FLOOR_NATS {
+        return None;
     }
-    let correlations = correlations(found)?;
-    let mut alike: Vec<(usize, String)> = Vec::new();
-    for (step, own) in sizes.iter().enumerate() {
-        let Some(own) = *own else { continue };
-        let others = sizes.iter().flatten().filter(|other| {
-            let (one, another) = (found.parameters[own].effect, found.parameters[**other].effect);
-            one != another
-                && depend_on_the_same(one, another)
-                && correlations[(own, **other)].abs() > ALIKE
-        });
-        let others = others.map(|other| found.parameters[*other].effect.to_owned());
-        alike.extend(others.map(|other| (step, other)));
-    }
-    for place in 0..found.steps.len() {
-        let Some(effect) = new_name(&found.steps[place]).map(str::to_owned) else { continue };
-        let others = alike.iter().filter(|(of, name)| *of == place && *name != effect);
-        let others: Vec<String> = others.map(|(_, name)| name.clone()).collect();
-        doubt(&mut found.steps[place], others);
-    }
-    Ok(())
-}
-
-/// Correlations of the errors of all sizes, with everything else free.
-fn correlations(found: &Found) -> Result<DMatrix<f64>, GapError> {
-    let Found { comparison, vehicle, parameters, gusts_mps, .. } = found;
-    let patterns = comparison.patterns(vehicle, *gusts_mps)?;
-    let residual = Split::of(&comparison.residual(vehicle, *gusts_mps)?);
-    let doubts = refine::doubts(comparison, vehicle, parameters)?;
-    let sizes = refine::slopes(comparison, vehicle, parameters)?;
-    let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
-    let covariance = problem.with(&sizes).at(&found.hyper).covariance();
-    let first = covariance.nrows() - sizes.len();
-    let sd = |size: usize| covariance[(first + size, first + size)].max(0.0).sqrt();
-    Ok(DMatrix::from_fn(sizes.len(), sizes.len(), |one, other| {
-        let both = sd(one) * sd(other);
-        if both > 0.0 { covariance[(first + one, first + other)] / both } else { 0.0 }
-    }))
+    let mut firsts = steps.iter().filter_map(|step| step.finding.effects().first().copied());
+    firsts.find(|first| *first != effect && depend_on_the_same(first, effect)).map(str::to_owned)
 }
 
 /// An effect that is named alone, and was not in the model.
@@ -342,27 +299,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_by_the_form_of_its_like_is_not_named_alone() {
-        let data = trial::data(3, |_, _| 0.0);
-        let of = |one: (&str, &str), other: (&str, &str)| {
-            let mut found = Found::nothing(trial::comparison(&data));
-            let both = [one, other];
-            found.steps = both.map(|(effect, _)| step(name(effect), 60.0, 9.0, &[])).to_vec();
-            found.parameters =
-                both.iter().filter_map(|(effect, size)| size_of(effect, size)).collect();
-            found.values = vec![(0.5, 0.1); 2];
-            beside_its_like(&mut found).unwrap();
-            told(&found.steps)
-        };
-        let drag = ("face-drag", "top");
-        let alike = of(drag, ("thrust-curve", "expo"));
-        assert_eq!(alike, ["face-drag thrust-curve", "thrust-curve face-drag"]);
-        assert_eq!(of(drag, ("rotor-inflow", "inflow_share")), ["face-drag", "rotor-inflow"]);
-        let warming = of(drag, ("motor-thermal", "drift_us"));
-        assert_eq!(warming, ["face-drag", "motor-thermal"], "it depends on something else");
-    }
-
-    #[test]
     fn what_is_beside_something_unknown_is_not_named_alone() {
         let of = |first: Finding, gain_nats: f64, then: Finding| {
             let mut steps = vec![step(first, gain_nats, 9.0, &[]), step(then, 50.0, 9.0, &[])];
@@ -392,6 +328,19 @@ mod tests {
         assert_eq!(of("thrust-curve", 6.1), "thrust-curve");
         assert_eq!(of("thrust-curve", 5.9), "thrust-curve rotor-inflow");
         assert_eq!(of("motor-thermal", 5.9), "motor-thermal", "it depends on something else");
+    }
+
+    #[test]
+    fn a_second_effect_of_a_kind_must_show_in_the_means_as_a_shape_must() {
+        let of = |effect: &str, plain: f64| {
+            let steps = [step(name("face-drag"), 108.0, 15.0, &[])];
+            form_of_what_was_found(&steps, effect, plain)
+        };
+        assert_eq!(of("thrust-curve", 14.0), Some("face-drag".to_owned()));
+        assert_eq!(of("thrust-curve", 14.0 + 1e-9), None);
+        assert_eq!(of("face-drag", 9.0), None, "found again with another size");
+        assert_eq!(of("motor-thermal", 9.0), None, "it depends on something else");
+        assert_eq!(form_of_what_was_found(&[], "thrust-curve", 9.0), None, "the first");
     }
 
     #[test]
