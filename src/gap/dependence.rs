@@ -82,6 +82,11 @@ impl Dependence {
         }
     }
 
+    /// Whether it is how the air meets a drone.
+    pub(super) fn is_of_air(self) -> bool {
+        matches!(self, Self::Climb | Self::Wind | Self::Lean | Self::Heading)
+    }
+
     /// Whether drones are held apart, not moments of a flight.
     pub fn is_of_drones(self) -> bool {
         matches!(self, Self::Place | Self::Drone)
@@ -96,6 +101,15 @@ pub(super) fn signals_of(effect: &str) -> &'static [Signal] {
 /// The signal that an effect feels by one of its own: the model's increments are those of climb.
 fn felt_as(signal: Signal) -> Signal {
     if signal == Signal::ModelIncrement { Signal::Climb } else { signal }
+}
+
+/// Whether an effect depends on nothing but how the air meets a drone.
+pub(super) fn is_of_air(effect: &str) -> bool {
+    let is = |signal: &Signal| {
+        matches!(felt_as(*signal), Signal::Climb | Signal::Horizontal | Signal::Tilt)
+    };
+    let signals = signals_of(effect);
+    !signals.is_empty() && signals.iter().all(is)
 }
 
 /// Whether an effect depends on the climb.

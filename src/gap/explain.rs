@@ -14,6 +14,7 @@ use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::contest::{Contest, before};
 use super::data::Data;
 use super::decide::{What, decide};
+use super::dependence::Dependence;
 use super::error::GapError;
 use super::generic::{Generic, all};
 use super::gls::{Column, Likelihood, Problem, Split};
@@ -22,7 +23,9 @@ use super::model_flights::ModelFlights;
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
-use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, round};
+use super::search::{
+    FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, round, told_of,
+};
 use super::single;
 use super::together::joined;
 use super::verdict::{Finding, Fitted, Rest, Rival, Step, is_strong_wind};
@@ -195,12 +198,14 @@ pub(super) fn search(
         refused,
         last,
     };
-    for step in 0..=options.most_steps {
+    let mut step = 0;
+    loop {
         let before = (search.comparison.clone(), search.found.clone());
         match search.takes_step(step) {
-            Ok(true) => {}
+            Ok(true) => step += 1,
             Ok(false) => break,
             Err(error) if error.is_not_flown() => {
+                // What is refused is no finding, and leaves room for as many.
                 if search.gives_up(before) {
                     continue;
                 }
@@ -376,7 +381,9 @@ impl Search<'_> {
                 let before = Found { comparison: self.comparison.clone(), ..self.found.clone() };
                 self.last = Some((before, likely));
                 let threshold_nats = decision.thresholds.generic;
-                self.take_shape(&look.generics[free.generic], &free, (threshold_nats, rivals));
+                let depends_on = told_of(round, sought, &free);
+                let told = (depends_on, threshold_nats, rivals);
+                self.take_shape(&look.generics[free.generic], &free, told);
             }
         }
         self.fly_again()?;
@@ -500,8 +507,13 @@ impl Search<'_> {
             found.extras.push(variant.column.clone());
             found.hyper = best.hyper;
         }
+        // In what another program simulated, sets of effects were held against sets that do as well.
+        let is_set = comparison.is_foreign();
+        let form = single::form_of_what_was_found(&found.steps, candidate.name, best.plain);
+        let mut names = with_alike(names, candidate);
+        names.extend(form.filter(|form| !is_set && !names.contains(form)));
         found.steps.push(Step {
-            finding: finding(with_alike(names, candidate), candidate.was_there, by_lean),
+            finding: finding(names, candidate.was_there, by_lean),
             gain_nats: best.gain,
             threshold_nats,
             alpha: self.options.alpha,
@@ -513,12 +525,13 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Takes a free shape into the regressors.
+    /// Takes a free shape into the regressors. What it is told to depend on, the threshold that it passed and its rivals go
+    /// into the step.
     fn take_shape(
         &mut self,
         generic: &Generic,
         free: &RankedGeneric,
-        (threshold_nats, rivals): (f64, Vec<Rival>),
+        (depends_on, threshold_nats, rivals): (Dependence, f64, Vec<Rival>),
     ) {
         let found = &mut self.found;
         let shape = generic.shape(&free.beta);
@@ -527,8 +540,9 @@ impl Search<'_> {
         found.hyper = free.hyper;
         found.steps.push(Step {
             finding: Finding::Unknown {
-                depends_on: generic.depends_on,
-                formula: super::formula::formula(generic.depends_on, &shape),
+                depends_on,
+                formula: super::formula::formula(generic.depends_on, &shape)
+                    .filter(|_| depends_on == generic.depends_on),
             },
             gain_nats: free.gain,
             threshold_nats,

@@ -144,7 +144,7 @@ impl Question<'_> {
 }
 
 /// Whether the raw gap of drones that were not fitted, or of rungs where there are none, grows.
-fn grows(gap: &Gap) -> bool {
+pub(super) fn grows(gap: &Gap) -> bool {
     gap.drones.or(gap.rungs).is_some_and(|shrink| {
         shrink.after_us.value > WORSE * shrink.before_us.value
             || shrink.after_without_air_us > WORSE * shrink.before_without_air_us

@@ -9,7 +9,7 @@ use super::drones::drones;
 use super::error::GapError;
 use super::explain::{Found, Options};
 use super::heldout::same_bins;
-use super::kept::Question;
+use super::kept::{Question, grows};
 use super::left_out::LeftOut;
 use super::model_flights::ModelFlights;
 use super::noise::{
@@ -21,8 +21,8 @@ use super::regimes::regimes;
 use super::sensor::sensor;
 use super::stand_in::stand_in;
 use super::verdict::{
-    DataUsed, Drones, Finding, Interval, Noise, Regime, Rung, SensorChannel, Step, VERDICT_SCHEMA,
-    Verdict,
+    DataUsed, Drones, Finding, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
+    VERDICT_SCHEMA, Verdict,
 };
 use super::warning::warnings;
 use super::words::summary;
@@ -119,16 +119,24 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
             repaired = vehicle.clone();
         }
     }
-    add_others(&mut repaired, leans.as_slice());
-    let question = Question {
-        original: vehicle,
-        repaired: &repaired,
-        simulated: &simulated,
-        plan: input.plan,
-        options,
-        flights: &ModelFlights::default(),
+    let answered = |repaired: &Vehicle| {
+        let mut repaired = repaired.clone();
+        add_others(&mut repaired, leans.as_slice());
+        let question = Question {
+            original: vehicle,
+            repaired: &repaired,
+            simulated: &simulated,
+            plan: input.plan,
+            options,
+            flights: &ModelFlights::default(),
+        };
+        question.answered(&train, &held)
     };
-    let (mut found, shrink) = question.answered(&train, &held)?;
+    let (mut found, mut shrink) = answered(&repaired)?;
+    if is_only_in_log(&channel, &shrink) {
+        channel.in_log = true;
+        (found, shrink) = answered(vehicle)?;
+    }
     if shrink.left_over().is_some() {
         super::single::beside_what_nothing_explains(&mut found.steps);
     }
@@ -278,6 +286,13 @@ fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
     model
 }
 
+/// Whether an error of the velocity that was taken into the model's loop is the log's alone after all. Which of the two it
+/// is was asked in still air; if in the air that was found the model with the error is farther from the logs, its loop
+/// has none.
+fn is_only_in_log(channel: &SensorChannel, gap: &Gap) -> bool {
+    channel.named && !channel.in_log && grows(gap)
+}
+
 /// The vehicle with the error of its vertical velocity, where that was named.
 fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
     let mut vehicle = vehicle.clone();
@@ -319,6 +334,7 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
 #[cfg(test)]
 mod tests {
     use super::super::trial;
+    use super::super::verdict::Shrink;
     use super::*;
     use crate::flight::{Flight, Series};
     use crate::gap::bins::BinValues;
@@ -392,6 +408,21 @@ mod tests {
         let gap = |explained: &Explained| explained.verdict.gap.drones.unwrap().before_us.value;
         assert!(gap(&clean) < 1.0, "{}", gap(&clean));
         assert!(gap(&poisoned) > 5.0, "{}", gap(&poisoned));
+    }
+
+    #[test]
+    fn an_error_of_the_velocity_that_makes_the_gap_larger_is_the_logs_alone() {
+        let us = |value: f64| Interval { value, low: value, high: value };
+        let gap = |after_us: f64| {
+            let (before_us, after_us) = (us(20.0), us(after_us));
+            Gap { drones: Some(Shrink { before_us, after_us, ..Shrink::default() }), rungs: None }
+        };
+        let late = SensorChannel { named: true, ..SensorChannel::default() };
+        assert!(is_only_in_log(&late, &gap(20.3)), "1.5 % more");
+        assert!(!is_only_in_log(&late, &gap(20.1)), "as good as the same");
+        let known = SensorChannel { in_log: true, ..late.clone() };
+        let none = SensorChannel { named: false, ..late };
+        assert!(!is_only_in_log(&known, &gap(20.3)) && !is_only_in_log(&none, &gap(20.3)));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Variant};
+use super::decide::CLASS_NATS;
 use super::dependence::Dependence;
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
@@ -379,6 +380,21 @@ fn drop_idle_product(found: &mut Vec<RankedGeneric>, sought: Sought<'_>) {
     }
 }
 
+/// What a free shape is told to depend on. A product of climb with time and one with height that explain the same leave
+/// open which of them it is: told is what they have in common.
+pub(super) fn told_of(round: &Round, sought: Sought<'_>, free: &RankedGeneric) -> Dependence {
+    let depends_on = |one: &RankedGeneric| sought.generics[one.generic].depends_on;
+    let own = depends_on(free);
+    let products = [Dependence::ClimbTime, Dependence::ClimbHeight];
+    let explains_the_same = |other: &RankedGeneric| {
+        depends_on(other) != own
+            && products.contains(&depends_on(other))
+            && other.gain > free.gain - CLASS_NATS
+    };
+    let is_open = products.contains(&own) && round.generics.iter().any(explains_the_same);
+    if is_open { Dependence::Climb } else { own }
+}
+
 /// A sum of regressors, us.
 fn sum(columns: &[Column], beta: &[f64]) -> Option<Column> {
     Some(columns.first()?.each(|group, drone, bin| {
@@ -513,6 +529,43 @@ mod tests {
             assert!(!is_left(30.0, 35.0) && !is_left(30.0, 38.0) && is_left(30.0, 38.0 + 1e-9));
             assert!(is_left(14.0, 15.0), "a shape that is none takes nothing away: {pair:?}");
         }
+    }
+
+    #[test]
+    fn products_that_explain_the_same_tell_what_they_have_in_common() {
+        let generics = [Dependence::ClimbTime, Dependence::ClimbHeight, Dependence::Climb];
+        let generics = generics.map(|depends_on| Generic {
+            depends_on,
+            axis: "",
+            columns: Vec::new(),
+            felt: Vec::new(),
+            along: Vec::new(),
+            penalty: 0.0,
+        });
+        let sought = Sought { library: &[], generics: &generics, drones: &[] };
+        let groups = patterns();
+        let split = Split::of(&pulses(&groups));
+        let problem = Problem::new(&groups, &split);
+        let ranked = |generic: usize, gain: f64| RankedGeneric {
+            generic,
+            gain,
+            plain: gain,
+            beta: Vec::new(),
+            size_us: 3.0,
+            range_us: 3.0,
+            hyper: Hyper::default(),
+        };
+        let told = |own: usize, other: (usize, f64)| {
+            let free = ranked(own, 60.0);
+            let generics = vec![free.clone(), ranked(other.0, other.1)];
+            let base = problem.at(&Hyper::default());
+            let round = Round { groups: groups.clone(), base, library: Vec::new(), generics };
+            told_of(&round, sought, &free)
+        };
+        assert_eq!(told(0, (1, 54.0 + 1e-9)), Dependence::Climb);
+        assert_eq!(told(1, (0, 61.0)), Dependence::Climb);
+        assert_eq!(told(0, (1, 54.0)), Dependence::ClimbTime);
+        assert_eq!(told(0, (2, 59.0)), Dependence::ClimbTime, "a curve is no other product");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use super::candidates::set;
 use super::contest::PRODUCT_NATS;
 use super::decide::{CONTEST_MARGINS, margin_nats};
-use super::dependence::{Dependence, depend_on_the_same, signals_of};
+use super::dependence::{Dependence, depend_on_the_same, is_of_air, signals_of};
 use super::error::GapError;
 use super::explain::Found;
 use super::generic::climb_shapes;
@@ -14,7 +14,7 @@ use super::gls::{Problem, Split};
 use super::refine::{self, Parameter, half_interval};
 use super::search::FREE_FLOOR_NATS;
 use super::verdict::{Finding, Rest, Rival, Step};
-use crate::effects::{Role, Signal};
+use crate::effects::{Role, Signal, find};
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
 const AT_BOUND: f64 = 1e-3;
@@ -40,6 +40,7 @@ pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     beside_a_curve(found)?;
     beside_something_unknown(&mut found.steps);
     beside_something_larger(&mut found.steps);
+    beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
     Ok(())
 }
@@ -75,6 +76,17 @@ fn gains(found: &Found, size: usize) -> Result<[f64; 2], GapError> {
     let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
     let solution = problem.with(&sizes).at(&found.hyper);
     Ok([solution.gain(&own).nats, solution.gain_of_all(&curves).1])
+}
+
+/// What an effect is told with that was found after others, and gains so much in the means, nats: the first of those that
+/// depends on the same, unless the means alone would show a free shape. By less it may be what the form of that one leaves,
+/// which no library has exactly, however well the drones scatter for it.
+pub(super) fn form_of_what_was_found(steps: &[Step], effect: &str, plain: f64) -> Option<String> {
+    if plain > FREE_FLOOR_NATS {
+        return None;
+    }
+    let mut firsts = steps.iter().filter_map(|step| step.finding.effects().first().copied());
+    firsts.find(|first| *first != effect && depend_on_the_same(first, effect)).map(str::to_owned)
 }
 
 /// An effect that is named alone, and was not in the model.
@@ -167,17 +179,33 @@ fn beside_something_larger(steps: &mut [Step]) {
     }
 }
 
-/// Names beside a free shape that is left and depends on the same: an effect is named alone only if it leaves nothing of
-/// its kind. What is left may be no finding because only the scatter between drones shows it.
+/// Motions of the air: no vehicle lacks them, and they can stand for what a model lacks. They are told with what explains
+/// most beside them, of whatever kind, or else with something unknown that depends on the height as they do.
+fn beside_what_the_air_may_be(steps: &mut [Step]) {
+    for step in steps {
+        let Some(motion) = new_name(step).filter(|name| find(name).is_none()) else { continue };
+        let motion = motion.to_owned();
+        let best = step.rivals.iter().find(|rival| rival.name != motion);
+        let height = || Dependence::Height.name().to_owned();
+        let other = best.map_or_else(height, |rival| rival.name.clone());
+        doubt(step, [other]);
+    }
+}
+
+/// Names beside a free shape that is left above its threshold, depends on the same and explains a fair share of what the
+/// name does: an effect is named alone only if it leaves nothing of its kind. What is left may be no finding because it
+/// hardly matters, or because only the scatter between drones shows it.
 fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
-    if rest.gain_nats <= FREE_FLOOR_NATS {
+    if rest.gain_nats <= FREE_FLOOR_NATS.max(rest.threshold_nats) {
         return;
     }
     for step in steps {
         let Some(effect) = new_name(step) else { continue };
-        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
-        let other = alike && rest.gain_nats > UNKNOWN_SHARE * step.gain_nats;
+        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal))
+            // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
+            || depends_on.is_of_air() && is_of_air(effect);
+        let other = alike && rest.gain_nats > RIVAL_SHARE * step.gain_nats;
         doubt(step, other.then(|| depends_on.name().to_owned()));
     }
 }
@@ -303,6 +331,32 @@ mod tests {
     }
 
     #[test]
+    fn a_second_effect_of_a_kind_must_show_in_the_means_as_a_shape_must() {
+        let of = |effect: &str, plain: f64| {
+            let steps = [step(name("face-drag"), 108.0, 15.0, &[])];
+            form_of_what_was_found(&steps, effect, plain)
+        };
+        assert_eq!(of("thrust-curve", 14.0), Some("face-drag".to_owned()));
+        assert_eq!(of("thrust-curve", 14.0 + 1e-9), None);
+        assert_eq!(of("face-drag", 9.0), None, "found again with another size");
+        assert_eq!(of("motor-thermal", 9.0), None, "it depends on something else");
+        assert_eq!(form_of_what_was_found(&[], "thrust-curve", 9.0), None, "the first");
+    }
+
+    #[test]
+    fn a_motion_of_the_air_is_never_named_alone() {
+        let of = |effect: &str, rivals: &[&str]| {
+            let mut steps = [step(name(effect), 28.0, 9.0, rivals)];
+            beside_what_the_air_may_be(&mut steps);
+            told(&steps).concat()
+        };
+        let seen = ["updraft-profile", "climb", "height"];
+        assert_eq!(of("updraft-profile", &seen), "updraft-profile climb");
+        assert_eq!(of("updraft-profile", &[]), "updraft-profile height");
+        assert_eq!(of("battery", &seen), "battery", "an effect of the vehicle");
+    }
+
+    #[test]
     fn what_a_shape_is_left_beside_has_the_rivals_of_that_kind() {
         let free = step(unknown(Dependence::Climb), 30.0, 9.0, &[]);
         let mut steps = vec![step(name("face-drag"), 15.0, 9.0, &["vortex-ring", "battery"])];
@@ -329,9 +383,10 @@ mod tests {
             beside_what_is_left(&mut steps, &Rest { gain_nats, candidate, ..Rest::default() });
             told(&steps).concat()
         };
-        let told_with = |candidate: &str, gain_nats: f64| with(40.0, candidate, gain_nats);
+        let told_with = |candidate: &str, gain_nats: f64| with(80.0, candidate, gain_nats);
         assert_eq!(told_with("climb", 20.0), "face-drag");
         assert_eq!(told_with("climb", 20.0 + 1e-9), "face-drag climb");
+        assert_eq!(told_with("wind", 20.0 + 1e-9), "face-drag wind", "a body feels the whole air");
         assert_eq!(told_with("voltage", 90.0), "face-drag", "a drag has no battery");
         assert_eq!(told_with("rotor-inflow", 90.0), "face-drag", "an effect is none of them");
         assert_eq!(with(10.0, "climb", 14.0), "face-drag", "not above what chance gains");

@@ -439,3 +439,65 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::next::Elements;
+    use crate::gap::next::result::Verified;
+
+    /// A question that this flight would answer at once or not, and whether each simulated answer was told.
+    fn asked(reached: bool, told: &[bool]) -> Asked {
+        let answer = |told: &bool| Verified {
+            truth: "rotor-inflow".to_owned(),
+            size: 0.4,
+            found: Vec::new(),
+            told: *told,
+            predicted_z: 6.0,
+            reached_z: None,
+        };
+        Asked {
+            kind: Kind::Class,
+            question: "is it one or the other?".to_owned(),
+            wanted_z: 5.0,
+            present_z: 1.0,
+            proposed_z: 6.0,
+            reached,
+            flights_needed: None,
+            from: Vec::new(),
+            verified: told.iter().map(answer).collect(),
+        }
+    }
+
+    fn refused(questions: Vec<Asked>) -> Option<String> {
+        let next = Next {
+            schema: NEXT_SCHEMA.to_owned(),
+            made_by: String::new(),
+            flight: String::new(),
+            wanted_z: 5.0,
+            present_s: 600.0,
+            proposed_s: 600.0,
+            reaches: true,
+            elements: Elements::ALL,
+            why: Vec::new(),
+            briefing: Vec::new(),
+            questions,
+            predicted_flights: 1,
+            notes: Vec::new(),
+        };
+        refuse_untold(&next, Path::new("campaign/gap")).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_flight_that_told_nothing_when_it_was_simulated_is_refused() {
+        let said = refused(vec![asked(true, &[false, false]), asked(true, &[false])]).unwrap();
+        assert!(said.contains("campaign/gap: the best flight"), "{said}");
+        assert!(said.contains("told it in 0 of 3 flights; nothing was written"), "{said}");
+        // One answer that is told is something.
+        assert_eq!(refused(vec![asked(true, &[false, true]), asked(true, &[false])]), None);
+        // What takes several flights is not expected of one, nor counts what it happened to tell.
+        assert_eq!(refused(vec![asked(false, &[false])]), None);
+        assert!(refused(vec![asked(false, &[true]), asked(true, &[false])]).is_some());
+        assert_eq!(refused(vec![asked(true, &[])]), None, "nothing was simulated");
+    }
+}

@@ -134,7 +134,17 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     let ended = bench.expect(2, &["blind", "reveal", "game"]);
     assert!(ended.err.contains("game/gap/verdict.json was edited"), "{ended}");
     assert!(ended.err.contains("compare again (`updraft gap game`)"), "{ended}");
+    // Nor does an edited verdict lead to another flight.
+    let next = ["gap", "next", "game/flight", "--gap", "game/gap", "--no-verify"];
+    let ended = bench.expect(2, &next);
+    assert!(ended.err.contains("game/gap/verdict.json was edited after `updraft gap`"), "{ended}");
+    assert!(
+        !bench.path("game/gap/next.toml").exists() && !ended.err.contains("battery"),
+        "{ended}"
+    );
     fs::write(bench.path("game/gap/verdict.json"), &written).unwrap();
+    let ended = bench.run(&next);
+    assert!(!ended.err.contains("was edited"), "{ended}");
     assert!(!bench.path("game/reveal.json").exists());
 
     let ended = bench.expect(0, &["blind", "reveal", "game"]);
