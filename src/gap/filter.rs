@@ -42,6 +42,12 @@ pub(super) struct Filter {
     gains: Vec<f64>,
     /// Of the innovations, by observation.
     inverse_sd: Vec<f64>,
+    /// Covariances of the states before each observation, in rows of [`blocks`].
+    pub(super) covariances: Vec<Block>,
+    /// Covariances of the states with each observation: `dim` for each.
+    pub(super) crosses: Vec<f64>,
+    /// Variances of the innovations, by observation.
+    pub(super) variances: Vec<f64>,
     /// Sum of ln of the innovations' variances.
     pub log_det: f64,
 }
@@ -66,10 +72,27 @@ impl Filter {
             decays: Vec::with_capacity(count * dim),
             gains: Vec::with_capacity(count * dim),
             inverse_sd: Vec::with_capacity(count),
+            covariances: Vec::with_capacity(count * dim * blocks(dim)),
+            crosses: Vec::with_capacity(count * dim),
+            variances: Vec::with_capacity(count),
             log_det: 0.0,
         };
-        let Self { states, observations, decays, gains, inverse_sd, log_det, .. } = &mut filter;
+        let Self {
+            states,
+            observations,
+            decays,
+            gains,
+            inverse_sd,
+            covariances,
+            crosses,
+            variances,
+            log_det,
+            ..
+        } = &mut filter;
         run(states, observations, |seen| {
+            covariances.extend_from_slice(seen.covariance);
+            crosses.extend_from_slice(seen.cross);
+            variances.push(seen.variance);
             *log_det += seen.variance.ln();
             let sd = seen.variance.sqrt();
             decays.extend_from_slice(seen.decay);
@@ -92,24 +115,61 @@ impl Filter {
         )
     }
 
+    /// Factors on the states from one observation to the next.
+    pub(super) fn decay(&self, place: usize) -> &[f64] {
+        &self.decays[place * self.dim..][..self.dim]
+    }
+
     /// A series as independent noise of variance 1, if its covariance is the filter's.
     pub(super) fn whiten(&self, series: &[f64]) -> Vec<f64> {
-        let mut state = vec![0.0; self.dim];
-        self.steps()
-            .zip(series)
-            .map(|(step, value)| {
-                for (value, decay) in state.iter_mut().zip(step.decay) {
-                    *value *= decay;
+        self.whiten_all(1, |_, place| series[place])
+    }
+
+    /// So many series, each as by [`Filter::whiten`], one after another; `value` is that of a series at an observation.
+    pub(super) fn whiten_all(&self, count: usize, value: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut white = vec![0.0; count * self.observations.len()];
+        by_lanes(count, |first, lanes| match lanes {
+            Lanes::One => self.whiten_some::<1>(first, &value, &mut white),
+            Lanes::Few => self.whiten_some::<FEW>(first, &value, &mut white),
+            Lanes::Many => self.whiten_some::<MANY>(first, &value, &mut white),
+        });
+        white
+    }
+
+    /// Whitens series from the `first` on, side by side.
+    fn whiten_some<const LANES: usize>(
+        &self,
+        first: usize,
+        value: impl Fn(usize, usize) -> f64,
+        white: &mut [f64],
+    ) {
+        let bins = self.observations.len();
+        let count = white.len().checked_div(bins).unwrap_or(0);
+        let mut rows = vec![[0.0; LANES]; bins];
+        for (lane, series) in (first..count).take(LANES).enumerate() {
+            rows.iter_mut().enumerate().for_each(|(place, row)| row[lane] = value(series, place));
+        }
+        // Each state is carried on to the next observation as soon as this one has told it.
+        let mut state = vec![[0.0; LANES]; self.dim];
+        let next = self.steps().skip(1).map(|step| step.decay).chain([&[][..]]);
+        for ((step, next), row) in self.steps().zip(next).zip(&mut rows) {
+            let mut expected = [0.0; LANES];
+            for (index, factor) in step.looks_at {
+                add(&mut expected, *factor, &state[*index]);
+            }
+            for (value, expected) in row.iter_mut().zip(expected) {
+                *value = (*value - expected) * step.inverse_sd;
+            }
+            for ((state, gain), decay) in state.iter_mut().zip(step.gain).zip(next) {
+                for (value, innovation) in state.iter_mut().zip(&*row) {
+                    *value = (*value + gain * innovation) * decay;
                 }
-                let expected: f64 =
-                    step.looks_at.iter().map(|(index, factor)| state[*index] * factor).sum();
-                let innovation = (value - expected) * step.inverse_sd;
-                for (value, gain) in state.iter_mut().zip(step.gain) {
-                    *value += gain * innovation;
-                }
-                innovation
-            })
-            .collect()
+            }
+        }
+        for (lane, white) in white.chunks_exact_mut(bins.max(1)).skip(first).take(LANES).enumerate()
+        {
+            white.iter_mut().zip(&rows).for_each(|(white, row)| *white = row[lane]);
+        }
     }
 
     /// The inverse of the covariance times a series: the whitening and its transpose.
@@ -119,18 +179,40 @@ impl Filter {
         weighed
     }
 
-    /// The transpose of the whitening: makes the weighed series of a whitened one.
+    /// The transpose of the whitening: makes the weighed series of whitened ones, one after another.
     pub(super) fn back(&self, white: &mut [f64]) {
-        let mut back = vec![0.0; self.dim];
-        for (step, value) in self.steps().zip(white).rev() {
-            let sum: f64 = step.gain.iter().zip(&back).map(|(gain, back)| gain * back).sum();
-            *value = (*value + sum) * step.inverse_sd;
+        let count = white.len().checked_div(self.observations.len()).unwrap_or(0);
+        by_lanes(count, |first, lanes| match lanes {
+            Lanes::One => self.back_some::<1>(first, white),
+            Lanes::Few => self.back_some::<FEW>(first, white),
+            Lanes::Many => self.back_some::<MANY>(first, white),
+        });
+    }
+
+    /// As [`Filter::back`], of some series from the `first` on, side by side.
+    fn back_some<const LANES: usize>(&self, first: usize, white: &mut [f64]) {
+        let mut rows = side_by_side::<LANES>(white, self.observations.len(), first);
+        let mut back = vec![[0.0; LANES]; self.dim];
+        for (step, row) in self.steps().zip(&mut rows).rev() {
+            let mut sum = [0.0; LANES];
+            for (back, gain) in back.iter().zip(step.gain) {
+                add(&mut sum, *gain, back);
+            }
+            for (value, sum) in row.iter_mut().zip(sum) {
+                *value = (*value + sum) * step.inverse_sd;
+            }
             for (index, factor) in step.looks_at {
-                back[*index] -= factor * *value;
+                add(&mut back[*index], -factor, row);
             }
             for (back, decay) in back.iter_mut().zip(step.decay) {
-                *back *= decay;
+                for value in back {
+                    *value *= decay;
+                }
             }
+        }
+        let bins = self.observations.len().max(1);
+        for (lane, white) in white.chunks_exact_mut(bins).skip(first).take(LANES).enumerate() {
+            white.iter_mut().zip(&rows).for_each(|(white, row)| *white = row[lane]);
         }
     }
 
@@ -151,6 +233,54 @@ impl Filter {
                 expected + innovation / step.inverse_sd
             })
             .collect()
+    }
+}
+
+/// Series that are taken side by side: each waits for its own last step, and meanwhile the others go on. As many
+/// as fit into registers and cache; numerical.
+const MANY: usize = 8;
+/// As [`MANY`], where few are left.
+const FEW: usize = 4;
+
+/// How many series are taken side by side.
+#[derive(Clone, Copy)]
+enum Lanes {
+    One,
+    Few,
+    Many,
+}
+
+/// Calls with the first of some series each, and how many of them there are at most.
+fn by_lanes(count: usize, mut some: impl FnMut(usize, Lanes)) {
+    let mut first = 0;
+    while first < count {
+        let (lanes, taken) = match count - first {
+            1 => (Lanes::One, 1),
+            2..=FEW => (Lanes::Few, FEW),
+            _ => (Lanes::Many, MANY),
+        };
+        some(first, lanes);
+        first += taken;
+    }
+}
+
+/// Series of so many values, one after another, from the `first` on side by side; zeros where there are no more.
+fn side_by_side<const LANES: usize>(
+    series: &[f64],
+    bins: usize,
+    first: usize,
+) -> Vec<[f64; LANES]> {
+    let mut rows = vec![[0.0; LANES]; bins];
+    for (lane, values) in series.chunks_exact(bins.max(1)).skip(first).take(LANES).enumerate() {
+        rows.iter_mut().zip(values).for_each(|(row, value)| row[lane] = *value);
+    }
+    rows
+}
+
+/// Adds a multiple, lane by lane.
+pub(super) fn add<const LANES: usize>(sum: &mut [f64; LANES], times: f64, other: &[f64; LANES]) {
+    for (sum, other) in sum.iter_mut().zip(other) {
+        *sum += times * other;
     }
 }
 
@@ -181,65 +311,177 @@ pub(super) fn log_det_and_chi2(
     (log_det, chi2)
 }
 
+/// Values of states side by side: rows of matrices consist of whole blocks, with zeros at the end.
+pub(super) const BLOCK: usize = 4;
+/// See [`BLOCK`].
+pub(super) type Block = [f64; BLOCK];
+
+/// Blocks that hold so many values.
+pub(super) fn blocks(dim: usize) -> usize {
+    dim.div_ceil(BLOCK).max(1)
+}
+
+/// Width of rows of blocks: where it is known beforehand, loops over a row are unrolled.
+pub(super) trait Wide: Copy {
+    /// Blocks of a row.
+    fn blocks(self) -> usize;
+}
+
+/// A width that is known.
+#[derive(Clone, Copy)]
+pub(super) struct Known<const BLOCKS: usize>;
+
+impl<const BLOCKS: usize> Wide for Known<BLOCKS> {
+    fn blocks(self) -> usize {
+        BLOCKS
+    }
+}
+
+impl Wide for usize {
+    fn blocks(self) -> usize {
+        self
+    }
+}
+
 /// The covariances at one observation.
-pub(super) struct Seen<'a> {
-    /// Of the states before it, in rows; only what is not above the diagonal.
-    pub covariance: &'a [f64],
+struct Seen<'a> {
+    /// Of the states before it, in rows of [`blocks`].
+    covariance: &'a [Block],
     /// Factors on the states since the observation before.
-    pub decay: &'a [f64],
+    decay: &'a [f64],
     /// Of the states with it.
-    pub cross: &'a [f64],
+    cross: &'a [f64],
     /// Variance of its innovation.
-    pub variance: f64,
+    variance: f64,
+}
+
+/// Factors on states over some times. Bins come at regular times, and many states are forgotten equally fast.
+struct Decays<'a> {
+    states: &'a [State],
+    /// The first state that is forgotten as fast as each.
+    alike: Vec<usize>,
+    known: Vec<(f64, Vec<f64>)>,
+}
+
+/// Times of which the factors are kept. Numerical.
+const DECAYS_KEPT: usize = 8;
+
+impl<'a> Decays<'a> {
+    fn of(states: &'a [State]) -> Self {
+        let first = |state: &State| {
+            states.iter().position(|other| other.time_s == state.time_s).unwrap_or_default()
+        };
+        let alike = states.iter().map(first).collect();
+        Self { states, alike, known: Vec::with_capacity(DECAYS_KEPT) }
+    }
+
+    fn over(&mut self, elapsed_s: f64) -> &[f64] {
+        let known = self.known.iter().position(|(of_s, _)| *of_s == elapsed_s);
+        let place = known.unwrap_or_else(|| {
+            let mut decay = vec![1.0; self.states.len()];
+            if elapsed_s > 0.0 {
+                for (index, state) in self.states.iter().enumerate() {
+                    decay[index] = match self.alike[index] {
+                        first if first < index => decay[first],
+                        _ => (-elapsed_s / state.time_s).exp(),
+                    };
+                }
+            }
+            if self.known.len() == DECAYS_KEPT {
+                self.known.remove(0);
+            }
+            self.known.push((elapsed_s, decay));
+            self.known.len() - 1
+        });
+        &self.known[place].1
+    }
 }
 
 /// Runs the covariances through the observations.
-pub(super) fn run(states: &[State], observations: &[Observation], mut tell: impl FnMut(Seen<'_>)) {
-    let dim = states.len();
-    // Of a symmetric matrix only what is not above the diagonal.
-    let mut covariance = vec![0.0; dim * dim];
-    let at = |a: usize, b: usize| a.max(b) * dim + a.min(b);
+fn run(states: &[State], observations: &[Observation], tell: impl FnMut(Seen<'_>)) {
+    // Those of a drone, and of the means of one group and of two, are known.
+    match blocks(states.len()) {
+        2 => run_wide(Known::<2>, states, observations, tell),
+        3 => run_wide(Known::<3>, states, observations, tell),
+        5 => run_wide(Known::<5>, states, observations, tell),
+        other => run_wide(other, states, observations, tell),
+    }
+}
+
+fn run_wide(
+    wide: impl Wide,
+    states: &[State],
+    observations: &[Observation],
+    mut tell: impl FnMut(Seen<'_>),
+) {
+    let (dim, wide) = (states.len(), wide.blocks());
+    let mut covariance = vec![[0.0; BLOCK]; dim * wide];
     for (index, state) in states.iter().enumerate() {
-        covariance[at(index, index)] = state.variance;
+        covariance[index * wide + index / BLOCK][index % BLOCK] = state.variance;
     }
     let mut before_s = observations.first().map_or(0.0, |first| first.time_s);
-    let (mut last_s, mut decay) = (f64::NAN, vec![1.0; dim]);
-    let mut cross = vec![0.0; dim];
+    let mut decays = Decays::of(states);
+    // Products of the factors on two states, and what each state is kicked by meanwhile.
+    let mut last_s = f64::NAN;
+    let mut both = vec![[0.0; BLOCK]; dim * wide];
+    let mut kicks = vec![0.0; dim];
+    let mut cross = vec![[0.0; BLOCK]; wide];
+    let mut gain = vec![[0.0; BLOCK]; wide];
     for seen in observations {
         let elapsed_s = (seen.time_s - before_s).max(0.0);
         before_s = seen.time_s;
-        if elapsed_s != last_s {
-            // Bins come at regular times.
-            last_s = elapsed_s;
-            for (decay, state) in decay.iter_mut().zip(states) {
-                *decay = (-elapsed_s / state.time_s).exp();
-            }
-        }
+        let decay = decays.over(elapsed_s);
         if elapsed_s > 0.0 {
-            let rows = covariance.chunks_exact_mut(dim.max(1)).zip(states).zip(&decay);
-            for (row, ((values, state), by)) in rows.enumerate() {
-                for (value, decay) in values.iter_mut().zip(&decay[..=row]) {
-                    *value *= by * decay;
+            if elapsed_s != last_s {
+                last_s = elapsed_s;
+                for (row, (both, by)) in both.chunks_exact_mut(wide).zip(decay).enumerate() {
+                    for (both, decay) in both.as_flattened_mut().iter_mut().zip(decay) {
+                        *both = by * decay;
+                    }
+                    kicks[row] = states[row].variance * (1.0 - by * by);
                 }
-                values[row] += state.variance * (1.0 - by * by);
+            }
+            for (values, both) in covariance.iter_mut().zip(&both) {
+                for (value, both) in values.iter_mut().zip(both) {
+                    *value *= both;
+                }
+            }
+            for (row, kick) in kicks.iter().enumerate() {
+                covariance[row * wide + row / BLOCK][row % BLOCK] += kick;
             }
         }
-        for (row, value) in cross.iter_mut().enumerate() {
-            *value = seen
-                .looks_at
-                .iter()
-                .map(|(state, factor)| covariance[at(row, *state)] * factor)
-                .sum();
+        cross.fill([0.0; BLOCK]);
+        for (state, factor) in &seen.looks_at {
+            for (cross, values) in cross.iter_mut().zip(&covariance[state * wide..][..wide]) {
+                add(cross, *factor, values);
+            }
         }
+        let flat = cross.as_flattened();
         let variance = seen.noise
-            + seen.looks_at.iter().map(|(state, factor)| cross[*state] * factor).sum::<f64>();
+            + seen.looks_at.iter().map(|(state, factor)| flat[*state] * factor).sum::<f64>();
         let variance = variance.max(f64::MIN_POSITIVE);
-        tell(Seen { covariance: &covariance, decay: &decay, cross: &cross, variance });
-        let rows = covariance.chunks_exact_mut(dim.max(1)).zip(&cross);
-        for (row, (values, by)) in rows.enumerate() {
-            let by = by / variance;
-            for (value, cross) in values.iter_mut().zip(&cross[..=row]) {
-                *value -= by * cross;
+        tell(Seen { covariance: &covariance, decay, cross: &flat[..dim], variance });
+        for (gain, cross) in gain.iter_mut().zip(&cross) {
+            for (gain, cross) in gain.iter_mut().zip(cross) {
+                *gain = cross / variance;
+            }
+        }
+        for (row, values) in covariance.chunks_exact_mut(wide).enumerate() {
+            let (own, place) = (row / BLOCK, row % BLOCK);
+            let (own_cross, own_gain) = (cross[own][place], gain[own][place]);
+            // Both halves are the same to the last bit: an element is that of its larger index's row.
+            for (values, cross) in values[..own].iter_mut().zip(&cross) {
+                add(values, -own_gain, cross);
+            }
+            for (column, value) in values[own].iter_mut().enumerate() {
+                *value -= if column <= place {
+                    own_gain * cross[own][column]
+                } else {
+                    gain[own][column] * own_cross
+                };
+            }
+            for (values, gain) in values[own + 1..].iter_mut().zip(&gain[own + 1..]) {
+                add(values, -own_cross, gain);
             }
         }
     }

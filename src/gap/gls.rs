@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::numeric::{extent, mean};
 
 use super::noise::{COUNT, GroupPattern, Hyper, Whitener};
-use crate::numeric::minimise;
+use crate::numeric::minimise_known;
 
 /// Values of all drones, by group, drone and bin.
 pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
@@ -179,16 +179,21 @@ pub(super) struct White {
 }
 
 impl White {
-    fn of(whitener: &Whitener, split: &Split) -> Self {
-        let deviations = split
-            .deviations
-            .iter()
-            .enumerate()
-            .flat_map(|(group, drones)| {
-                drones.iter().flat_map(move |drone| whitener.deviation(group, drone))
-            })
-            .collect();
-        Self { means: whitener.means(&split.means), deviations, known: Vec::new() }
+    /// Of several at once.
+    fn of<'s>(whitener: &Whitener, splits: impl IntoIterator<Item = &'s Split>) -> Vec<Self> {
+        let splits: Vec<&Split> = splits.into_iter().collect();
+        let means =
+            whitener.means(splits.len(), |split, group, bin| splits[split].means[group][bin]);
+        let means = means.chunks_exact(whitener.bins().max(1)).map(<[f64]>::to_vec);
+        let own = |split: &&Split| {
+            let mut deviations = Vec::new();
+            for (group, drones) in split.deviations.iter().enumerate() {
+                deviations.extend(whitener.deviations(group, drones));
+            }
+            deviations
+        };
+        let white = |(means, split)| Self { means, deviations: own(split), known: Vec::new() };
+        means.zip(&splits).map(white).collect()
     }
 
     fn dot(&self, other: &Self) -> f64 {
@@ -268,36 +273,32 @@ impl<'a> Problem<'a> {
     /// At fixed noise.
     pub(super) fn at(&self, hyper: &Hyper) -> Solution {
         let whitener = Whitener::new(self.groups, hyper);
-        let y = White::of(&whitener, self.pulses);
-        let white = |(place, column): (usize, &Split)| {
-            let mut white = White::of(&whitener, column);
+        let mut columns = White::of(&whitener, self.columns.iter().chain([self.pulses]));
+        let y = columns.pop().unwrap_or_default();
+        for (place, (white, column)) in columns.iter_mut().zip(&self.columns).enumerate() {
             if column.is_doubt {
                 white.known = vec![0.0; place];
                 white.known.push(1.0);
             }
-            white
-        };
-        let columns: Vec<White> = self.columns.iter().enumerate().map(white).collect();
+        }
         Solution::new(whitener, y, columns, *hyper)
     }
 
     /// Most probable noise from a start, with everything linear at its best.
     pub(super) fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
         let objective = |at: &[f64; COUNT]| {
-            let hyper = Hyper(*at);
-            let solution = self.at(&hyper);
-            -(solution.log_likelihood(likelihood) + hyper.log_prior())
+            let solution = self.at(&Hyper(*at));
+            let likely = solution.log_likelihood(likelihood) + solution.hyper.log_prior();
+            (-likely, solution)
         };
-        let slopes = |at: &[f64; COUNT], _| {
-            let hyper = Hyper(*at);
-            let mut slopes = self.at(&hyper).slopes(self.groups, likelihood);
-            for (slope, prior) in slopes.iter_mut().zip(hyper.prior_slopes()) {
+        let slopes = |_: &[f64; COUNT], solution: &Solution| {
+            let mut slopes = solution.slopes(self.groups, likelihood);
+            for (slope, prior) in slopes.iter_mut().zip(solution.hyper.prior_slopes()) {
                 *slope -= prior;
             }
             slopes
         };
-        let (at, _) = minimise(start.0, objective, slopes);
-        self.at(&Hyper(at))
+        minimise_known(start.0, objective, slopes).2
     }
 }
 
@@ -341,16 +342,17 @@ pub(super) struct Gain {
 impl Solution {
     fn new(whitener: Whitener, y: White, columns: Vec<White>, hyper: Hyper) -> Self {
         let count = columns.len();
-        let normal =
-            DMatrix::from_fn(count, count, |row, column| columns[row].dot(&columns[column]));
-        let right = DVector::from_fn(count, |row, _| columns[row].dot(&y));
+        let all: Vec<&White> = columns.iter().chain([&y]).collect();
+        let products = products(&all);
+        let normal = products.view((0, 0), (count, count)).into_owned();
+        let right = DVector::from_fn(count, |row, _| products[(row, count)]);
         let factor = normal.cholesky();
         let beta = factor.as_ref().map_or_else(
             || vec![0.0; count],
             |factor| factor.solve(&right).iter().copied().collect(),
         );
         let explained: f64 = beta.iter().zip(right.iter()).map(|(beta, right)| beta * right).sum();
-        let total = y.dot(&y);
+        let total = products[(count, count)];
         let freedom = (y.means.len() + y.deviations.len()) as f64 - count as f64;
         Self { hyper, whitener, y, columns, factor, beta, chi2: total - explained, freedom }
     }
@@ -368,7 +370,7 @@ impl Solution {
     /// How minus the log-likelihood changes with each parameter of the noise of these groups. (The coefficients are
     /// the best, so their own change counts for nothing.)
     fn slopes(&self, groups: &[GroupPattern], likelihood: Likelihood) -> [f64; COUNT] {
-        let mut rests = vec![self.residual_of(&self.y)];
+        let mut rests = vec![self.rest()];
         if let (Some(factor), Likelihood::Restricted) = (&self.factor, likelihood) {
             // What the determinant of the information changes by is the squares of independent regressors.
             let own = DMatrix::identity(self.columns.len(), self.columns.len());
@@ -405,9 +407,10 @@ impl Solution {
 
     /// What several more regressors would gain together: coefficients and nats.
     pub(super) fn gain_of_all(&self, columns: &[Column]) -> (Vec<f64>, f64) {
-        let whites: Vec<White> = columns.iter().map(|column| self.white(column)).collect();
+        let splits: Vec<Split> = columns.iter().map(Split::of_column).collect();
+        let whites = White::of(&self.whitener, &splits);
         let count = whites.len();
-        let residual = self.residual_of(&self.y);
+        let residual = self.rest();
         let parts: Vec<White> = whites.iter().map(|white| self.residual_of(white)).collect();
         let normal = DMatrix::from_fn(count, count, |row, column| {
             parts[row].dot(&parts[column]) + if row == column { 1e-9 } else { 0.0 }
@@ -420,7 +423,7 @@ impl Solution {
 
     /// A regressor whitened.
     pub(super) fn white(&self, column: &Column) -> White {
-        White::of(&self.whitener, &Split::of_column(column))
+        White::of(&self.whitener, [&Split::of_column(column)]).pop().unwrap_or_default()
     }
 
     /// Correlation of two regressors with everything in the model partialled out.
@@ -441,6 +444,15 @@ impl Solution {
         (information > 1e-9 * white.dot(white).max(1e-12)).then(|| (information, part.dot(&self.y)))
     }
 
+    /// What the model's regressors leave of the pulses.
+    fn rest(&self) -> White {
+        if self.factor.is_none() {
+            return self.y.clone();
+        }
+        let less: Vec<f64> = self.beta.iter().map(|beta| -beta).collect();
+        combined(self.y.clone(), &self.columns, &less)
+    }
+
     /// What the model's regressors leave of something.
     fn residual_of(&self, white: &White) -> White {
         let Some(factor) = &self.factor else { return white.clone() };
@@ -453,6 +465,71 @@ impl Solution {
     pub(super) fn simulate(&self, draw: impl FnMut() -> f64) -> Pulses {
         self.whitener.simulate(draw)
     }
+}
+
+/// Products of all pairs: those of means, deviations and what is known of each added up, which are observations of its own.
+fn products(all: &[&White]) -> DMatrix<f64> {
+    let of =
+        |part: fn(&White) -> &[f64]| pairs(&all.iter().map(|one| part(one)).collect::<Vec<_>>());
+    let mut products = of(|white| &white.means) + of(|white| &white.deviations);
+    for (place, white) in all.iter().enumerate() {
+        products[(place, place)] += white.known.iter().map(|known| known * known).sum::<f64>();
+    }
+    products
+}
+
+/// Series whose products are summed side by side. Numerical: as many pairs as there are registers for.
+const TILE: usize = 4;
+/// Places that are taken at a time. Numerical: the series of a flight's model then stay in the nearest cache.
+const STRIP: usize = 32;
+
+/// Products of all pairs of series, each summed from the first to the last place that both have.
+fn pairs(series: &[&[f64]]) -> DMatrix<f64> {
+    let count = series.len();
+    let mut products = DMatrix::zeros(count, count);
+    let long: Vec<usize> = (0..count).filter(|index| !series[*index].is_empty()).collect();
+    let Some(bins) = long.first().map(|index| series[*index].len()) else { return products };
+    if long.iter().any(|index| series[*index].len() != bins) {
+        return DMatrix::from_fn(count, count, |row, column| {
+            series[row].iter().zip(series[column]).map(|(a, b)| a * b).sum()
+        });
+    }
+    let tiles = long.len().div_ceil(TILE);
+    let mut sums = vec![[[0.0; TILE]; TILE]; tiles * (tiles + 1) / 2];
+    let mut strip = vec![[0.0; TILE]; STRIP * tiles];
+    for first in (0..bins).step_by(STRIP) {
+        let last = bins.min(first + STRIP);
+        for (lane, index) in long.iter().enumerate() {
+            for (row, value) in strip.chunks_exact_mut(tiles).zip(&series[*index][first..last]) {
+                row[lane / TILE][lane % TILE] = *value;
+            }
+        }
+        let rows = &strip[..(last - first) * tiles];
+        let mut sums = sums.iter_mut();
+        for one in 0..tiles {
+            for (other, sum) in (0..=one).zip(&mut sums) {
+                let mut tile = *sum;
+                for row in rows.chunks_exact(tiles) {
+                    let others = &row[other];
+                    for (sums, value) in tile.iter_mut().zip(&row[one]) {
+                        for (sum, other) in sums.iter_mut().zip(others) {
+                            *sum += value * other;
+                        }
+                    }
+                }
+                *sum = tile;
+            }
+        }
+    }
+    for (one, row) in long.iter().enumerate() {
+        for (other, column) in long[..=one].iter().enumerate() {
+            let (upper, left) = (one / TILE, other / TILE);
+            let sum = sums[upper * (upper + 1) / 2 + left][one % TILE][other % TILE];
+            products[(*row, *column)] = sum;
+            products[(*column, *row)] = sum;
+        }
+    }
+    products
 }
 
 /// A whitened series with shares of others added.

@@ -313,9 +313,21 @@ impl Whitener {
         Self { order, means, deviations, drones, log_det }
     }
 
-    /// Whitens the groups' means, by group and bin.
-    pub(super) fn means(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
-        self.means.whiten(&self.series(by_group))
+    /// Number of bins of all groups.
+    pub(super) fn bins(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Whitens means of the groups, of so many series, one after another; `value` is that of a series, a group and a bin.
+    pub(super) fn means(
+        &self,
+        count: usize,
+        value: impl Fn(usize, usize, usize) -> f64,
+    ) -> Vec<f64> {
+        self.means.whiten_all(count, |series, place| {
+            let (group, bin) = self.order[place];
+            value(series, group, bin)
+        })
     }
 
     /// Groups' means in the order of the filter.
@@ -335,11 +347,10 @@ impl Whitener {
         let of_means = || {
             let mut slopes = Slopes::zero(&self.means);
             slopes.add_log_det(&self.means, 0.5);
-            for (means, _) in series {
-                let mut weighed = means.to_vec();
-                self.means.back(&mut weighed);
-                slopes.add_square(&self.means, &weighed, -0.5);
-            }
+            let mut weighed: Vec<f64> =
+                series.iter().flat_map(|(means, _)| *means).copied().collect();
+            self.means.back(&mut weighed);
+            slopes.add_squares(&self.means, &weighed, -0.5);
             slopes
         };
         let mut first = 0;
@@ -355,11 +366,9 @@ impl Whitener {
             slopes.add_log_det(filter, 0.5 * drones.saturating_sub(1) as f64);
             for (_, deviations) in series {
                 let own = deviations.get(firsts[group]..firsts[group] + drones * bins);
-                for drone in own.unwrap_or_default().chunks_exact(bins.max(1)) {
-                    let mut weighed = drone.to_vec();
-                    filter.back(&mut weighed);
-                    slopes.add_square(filter, &weighed, -0.5);
-                }
+                let mut weighed = own.unwrap_or_default().to_vec();
+                filter.back(&mut weighed);
+                slopes.add_squares(filter, &weighed, -0.5);
             }
             slopes
         };
@@ -433,7 +442,11 @@ impl Whitener {
                         / (2.0 * STEP)
                 };
                 by[place] += change(shared, group.responses(&ahead), group.responses(&behind));
-                by[place] += change(own, group.own_responses(&ahead), group.own_responses(&behind));
+                // Who knows the air that all share answers by the own air alone.
+                if group.shift_mps.is_empty() || ![SHARED, GRADIENT].contains(&place) {
+                    by[place] +=
+                        change(own, group.own_responses(&ahead), group.own_responses(&behind));
+                }
             }
         }
         by
@@ -487,9 +500,9 @@ impl Whitener {
         shared
     }
 
-    /// Whitens one drone's deviations from its group's mean.
-    pub(super) fn deviation(&self, group: usize, series: &[f64]) -> Vec<f64> {
-        self.deviations[group].whiten(series)
+    /// Whitens the deviations of a group's drones from their mean, one drone after another.
+    pub(super) fn deviations(&self, group: usize, drones: &[Vec<f64>]) -> Vec<f64> {
+        self.deviations[group].whiten_all(drones.len(), |drone, bin| drones[drone][bin])
     }
 
     /// Pulses of all drones that the noise alone makes, by group and drone: from independent noise.

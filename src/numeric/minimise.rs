@@ -16,13 +16,27 @@ pub(crate) fn minimise<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> ([f64; N], f64) {
-    let value_at = |at: &[f64; N]| {
+    let function = |at: &[f64; N]| {
         let value = function(at);
-        if value.is_finite() { value } else { f64::INFINITY }
+        (value, value)
+    };
+    let (at, value, _) = minimise_known(start, function, |at, value| gradient_at(at, *value));
+    (at, value)
+}
+
+/// As [`minimise`], of a function that tells with its value what its gradient is made from. With that at the end.
+pub(crate) fn minimise_known<const N: usize, T>(
+    start: [f64; N],
+    function: impl Fn(&[f64; N]) -> (f64, T),
+    gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
+) -> ([f64; N], f64, T) {
+    let value_at = |at: &[f64; N]| {
+        let (value, known) = function(at);
+        (if value.is_finite() { value } else { f64::INFINITY }, known)
     };
     let mut at = start;
-    let mut value = value_at(&at);
-    let mut gradient = gradient_at(&at, value);
+    let (mut value, mut known) = value_at(&at);
+    let mut gradient = gradient_at(&at, &known);
     let mut inverse = identity::<N>();
     let (mut small, mut is_again) = (0, false);
     for _ in 0..MOST_STEPS {
@@ -46,18 +60,18 @@ pub(crate) fn minimise<const N: usize>(
             for (part, by) in next.iter_mut().zip(&direction) {
                 *part += length * by;
             }
-            let next_value = value_at(&next);
+            let (next_value, next_known) = value_at(&next);
             if next_value <= value + 1e-4 * length * slope {
-                found = Some((next, next_value));
+                found = Some((next, next_value, next_known));
                 break;
             }
             length *= 0.4;
         }
-        let Some((next, next_value)) = found else { break };
-        let next_gradient = gradient_at(&next, next_value);
+        let Some((next, next_value, next_known)) = found else { break };
+        let next_gradient = gradient_at(&next, &next_known);
         let gained = value - next_value;
         update(&mut inverse, &difference(&next, &at), &difference(&next_gradient, &gradient));
-        (at, value, gradient) = (next, next_value, next_gradient);
+        (at, value, gradient, known) = (next, next_value, next_gradient, next_known);
         small = if gained < ENOUGH { small + 1 } else { 0 };
         if small == 2 && is_again {
             break;
@@ -67,7 +81,7 @@ pub(crate) fn minimise<const N: usize>(
             (inverse, is_again, small) = (identity(), true, 0);
         }
     }
-    (at, value)
+    (at, value, known)
 }
 
 /// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.
