@@ -11,8 +11,12 @@ const APART: f64 = 1.2;
 const FAR_M: f64 = 500.0;
 /// A correlation below zero by this many of its standard errors is told.
 const SURE: f64 = 3.0;
-/// Fewer independent values say nothing of a sign.
+/// Fewer independent values say nothing of a sign,
 const FEWEST_INDEPENDENT: f64 = 6.0;
+/// but for a correlation like this of one eddy, second by second.
+const MIRRORED: f64 = -0.8;
+/// Fewer values do not follow an eddy.
+const FEWEST_OF_EDDY: usize = 30;
 
 /// Doubts about the times of a record: `step_s` between its values, `mean_s` the duration of each.
 pub(super) fn of_times(w: &Series, step_s: f64, mean_s: f64) -> Vec<String> {
@@ -78,11 +82,14 @@ pub(super) fn of_flight(flight: &MastFlight) -> Vec<String> {
     far.into_iter().chain(sign).collect()
 }
 
-/// Whether a correlation is below zero for sure; independent values by the error of the mean difference.
+/// Whether a correlation is below zero, for sure or almost -1; independent values by the error of the mean difference.
 fn is_mirrored(matched: &Matched) -> bool {
     let Some((correlation, bias_se)) = matched.correlation.zip(matched.bias_se_mps) else {
         return false;
     };
+    if matched.count >= FEWEST_OF_EDDY && correlation < MIRRORED {
+        return true;
+    }
     let independent = (matched.sd_mps / bias_se).powi(2);
     let bounded = correlation.clamp(-0.999, 0.999);
     independent >= FEWEST_INDEPENDENT && bounded.atanh() * (independent - 3.0).sqrt() < -SURE
@@ -136,7 +143,10 @@ mod tests {
         assert!(is_mirrored(&matched(-0.9, 0.1)));
         assert!(is_mirrored(&matched(-1.0, 0.1)));
         assert!(!is_mirrored(&matched(-0.4, 0.1)), "25 values");
-        assert!(!is_mirrored(&matched(-0.9, 0.4)), "two values");
+        assert!(is_mirrored(&matched(-0.9, 0.4)), "one eddy, mirrored");
+        assert!(!is_mirrored(&matched(-0.7, 0.4)), "two values");
+        let few = Matched { count: 5, ..matched(-0.9, 0.4) };
+        assert!(!is_mirrored(&few), "five means");
         assert!(!is_mirrored(&matched(0.9, 0.1)));
     }
 }
