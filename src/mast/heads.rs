@@ -139,7 +139,6 @@ fn usual_time(names: &[String], after: &[Vec<String>]) -> Option<(TimeColumn, us
         format,
         utc_offset_h: Some(0.0),
     };
-    let mut found: Option<TimeColumn> = None;
     if let (Some(date), Some(clock)) = (called("date"), called("time")) {
         let both = column(date, Some(clock), TimeFormat::Datetime);
         if let Some(between) = first_of(names, after, &both) {
@@ -151,6 +150,8 @@ fn usual_time(names: &[String], after: &[Vec<String>]) -> Option<(TimeColumn, us
         if let Some(between) = first_of(names, after, &dates) {
             return Some((dates, between));
         }
+    }
+    for own in TIMES.iter().filter_map(|name| called(name)) {
         let index = names.iter().position(|name| name == own)?;
         let number = |cells: &Vec<String>| cells.get(index)?.parse::<f64>().ok();
         let first = after.iter().enumerate().find_map(|(line, cells)| Some((line, number(cells)?)));
@@ -159,10 +160,10 @@ fn usual_time(names: &[String], after: &[Vec<String>]) -> Option<(TimeColumn, us
             let format = format.map_or(TimeFormat::S, |(_, format)| format);
             return Some((column(own, None, format), between));
         }
-        // Whatever stands there is told as no time where the table is read.
-        found.get_or_insert(dates);
     }
-    found.map(|time| (time, 0))
+    // Whatever stands there is told as no time where the table is read.
+    let first = TIMES.iter().find_map(|name| called(name))?;
+    Some((column(first, None, TimeFormat::Datetime), 0))
 }
 
 /// The first of the lines that has a time.
