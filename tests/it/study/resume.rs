@@ -11,12 +11,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::study::support::{SMALL, flown, result, settings, small, small_with};
 use updraft::study::{CellRecord, Settings, StudyError, Work, cells_folder, evaluate, logs_folder};
 
-/// Every file of a study's cells with its bytes.
+/// Every file of a study's cells with its bytes. While a study is flown, a temporary file may be gone before it is read.
 fn cells(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fs::read_dir(cells_folder(folder))
         .unwrap()
         .map(|entry| entry.unwrap().path())
-        .map(|path| (path.file_name().unwrap().to_string_lossy().into(), fs::read(path).unwrap()))
+        .filter_map(|path| {
+            let name: String = path.file_name().unwrap().to_string_lossy().into();
+            Some((name, fs::read(path).ok()?))
+        })
         .collect()
 }
 
