@@ -494,17 +494,21 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_product_is_more_than_what_it_comes_with() {
-        let free = |depends_on| Generic {
+    /// A free shape without columns.
+    fn free(depends_on: Dependence) -> Generic {
+        Generic {
             depends_on,
             axis: "",
             columns: Vec::new(),
             felt: Vec::new(),
             along: Vec::new(),
             penalty: 0.0,
-        };
-        let ranked = |generic: usize, gain: f64| RankedGeneric {
+        }
+    }
+
+    /// A free shape by its number, with what it gains.
+    fn ranked(generic: usize, gain: f64) -> RankedGeneric {
+        RankedGeneric {
             generic,
             gain,
             plain: gain,
@@ -512,7 +516,11 @@ mod tests {
             size_us: 3.0,
             range_us: 3.0,
             hyper: Hyper::default(),
-        };
+        }
+    }
+
+    #[test]
+    fn a_product_is_more_than_what_it_comes_with() {
         let pairs = [
             [Dependence::Climb, Dependence::ClimbTime],
             [Dependence::Step, Dependence::ClimbTime],
@@ -534,33 +542,17 @@ mod tests {
     #[test]
     fn products_that_explain_the_same_tell_what_they_have_in_common() {
         let generics = [Dependence::ClimbTime, Dependence::ClimbHeight, Dependence::Climb];
-        let generics = generics.map(|depends_on| Generic {
-            depends_on,
-            axis: "",
-            columns: Vec::new(),
-            felt: Vec::new(),
-            along: Vec::new(),
-            penalty: 0.0,
-        });
+        let generics = generics.map(free);
         let sought = Sought { library: &[], generics: &generics, drones: &[] };
         let groups = patterns();
         let split = Split::of(&pulses(&groups));
         let problem = Problem::new(&groups, &split);
-        let ranked = |generic: usize, gain: f64| RankedGeneric {
-            generic,
-            gain,
-            plain: gain,
-            beta: Vec::new(),
-            size_us: 3.0,
-            range_us: 3.0,
-            hyper: Hyper::default(),
-        };
         let told = |own: usize, other: (usize, f64)| {
-            let free = ranked(own, 60.0);
-            let generics = vec![free.clone(), ranked(other.0, other.1)];
+            let own = ranked(own, 60.0);
+            let generics = vec![own.clone(), ranked(other.0, other.1)];
             let base = problem.at(&Hyper::default());
             let round = Round { groups: groups.clone(), base, library: Vec::new(), generics };
-            told_of(&round, sought, &free)
+            told_of(&round, sought, &own)
         };
         assert_eq!(told(0, (1, 54.0 + 1e-9)), Dependence::Climb);
         assert_eq!(told(1, (0, 61.0)), Dependence::Climb);

@@ -61,12 +61,7 @@ impl Heads {
         for delimiter in DELIMITERS {
             for (index, line) in lines.iter().take(MOST_BEFORE).enumerate() {
                 let names = cells(line, delimiter);
-                let after = lines.get(index + 1..).unwrap_or_default();
-                let after: Vec<Vec<String>> = after
-                    .iter()
-                    .take(MOST_BETWEEN + 1)
-                    .map(|line| cells(line, delimiter))
-                    .collect();
+                let after = below(lines, index, delimiter);
                 if let Some((column, between)) = usual_time(&names, &after) {
                     return Self::at(index, between, (delimiter, names), Some(column));
                 }
@@ -86,9 +81,7 @@ impl Heads {
         let has = |names: &Vec<String>| names.iter().any(|name| plain(name) == time.column);
         let index = all.position(|names| has(&names)).unwrap_or(0);
         let names = lines.get(index).map(|line| cells(line, delimiter)).unwrap_or_default();
-        let after = lines.get(index + 1..).unwrap_or_default();
-        let after: Vec<Vec<String>> =
-            after.iter().take(MOST_BETWEEN + 1).map(|line| cells(line, delimiter)).collect();
+        let after = below(lines, index, delimiter);
         let between = first_of(&names, &after, time).unwrap_or(0);
         Self::at(index, between, (delimiter, names), Some(time.clone()))
     }
@@ -182,6 +175,12 @@ fn first_of(names: &[String], after: &[Vec<String>], time: &TimeColumn) -> Optio
         };
         time_of(&text, time).is_some()
     })
+}
+
+/// Cells of the lines in which the first values may be, below that of the names.
+fn below(lines: &[String], names: usize, delimiter: char) -> Vec<Vec<String>> {
+    let after = lines.iter().skip(names + 1).take(MOST_BETWEEN + 1);
+    after.map(|line| cells(line, delimiter)).collect()
 }
 
 /// Cells of a line.

@@ -13,8 +13,8 @@ const FEWEST_PAIRS: usize = 6;
 const FASTEST_MPS: f64 = 40.0;
 /// A speed with a larger share of itself as standard error is not told from a pattern that stands.
 const LARGEST_SHARE: f64 = 0.5;
-/// Share of the lags' squares, weighted by correlation, that one velocity must explain: fields that are carried past reach 0.4 to 1, noise
-/// and waves that stand 0.15 at most (tests).
+/// Share of the lags' squares, weighted by correlation, that one velocity must explain: fields that are carried past reach
+/// 0.4 to 1, noise and waves that stand 0.15 at most (tests).
 const EXPLAINED: f64 = 0.25;
 
 /// Record at a place: metres east and north of anywhere.
@@ -135,8 +135,8 @@ fn best_lag(a: &Record, b: &Record, most: usize) -> Option<(f64, f64)> {
 
 /// Velocity at which the pattern passes the points, by the lags at which pairs are most alike: a frozen pattern that is
 /// carried at `U` is most alike after `d · U / |U|²`. Pairs count by their correlation; the error is that of leaving out
-/// each point in turn (jackknife). `None` where too few pairs are alike, where no velocity explains most of the lags (noise, waves that
-/// stand), or where the pattern cannot be told from one that stands.
+/// each point in turn (jackknife). `None` where too few pairs are alike, where no velocity explains a quarter of the lags (noise,
+/// waves that stand), or where the pattern cannot be told from one that stands.
 pub fn advection(points: &[At<'_>], longest_s: f64) -> Option<Advection> {
     let step_s = points.first()?.record.step_s();
     let most = (longest_s / step_s) as usize;

@@ -55,6 +55,12 @@ fn values(bench: &Bench) -> Vec<(f64, f64)> {
     all.filter_map(|(time, value)| Some((zero_s + number(time), value.as_f64()?))).collect()
 }
 
+/// The campaign beside a mast, as JSON.
+fn compared(bench: &Bench, mast: &str) -> Value {
+    let ended = bench.expect(0, &["compare", "out", "--mast", mast, "--json"]);
+    ended.json("updraft.mast-comparison/1")
+}
+
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }

@@ -9,8 +9,7 @@ use serde_json::Value;
 use updraft::base::rng::{Purpose, stream};
 use updraft::mast::MastRecord;
 
-use super::{analysed, number, values};
-use crate::cli::support::Bench;
+use super::{analysed, compared, number, values};
 
 /// 2021-04-20 09:00:00 UTC, s since 1970.
 const ZERO_S: f64 = 1_618_909_200.0;
@@ -110,11 +109,6 @@ impl Mast {
         builder.write_variable(w, &packed).unwrap();
         builder.to_vec(NcWriteOptions { format: self.format }).unwrap().1
     }
-}
-
-fn compared(bench: &Bench, mast: &str) -> Value {
-    let ended = bench.expect(0, &["compare", "out", "--mast", mast, "--json"]);
-    ended.json("updraft.mast-comparison/1")
 }
 
 #[test]

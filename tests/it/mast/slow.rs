@@ -3,9 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use serde_json::Value;
-
-use super::{analysed, number, values};
+use super::{analysed, compared, number, values};
 use crate::cli::support::Bench;
 
 /// Means of the mast, s.
@@ -31,11 +29,6 @@ fn slow(bench: &Bench) -> String {
         writeln!(table, "{end_s:.0},{},{sd}", 0.1 + 0.8 * mean).unwrap();
     }
     table
-}
-
-fn compared(bench: &Bench, mast: &str) -> Value {
-    let ended = bench.expect(0, &["compare", "out", "--mast", mast, "--json"]);
-    ended.json("updraft.mast-comparison/1")
 }
 
 #[test]

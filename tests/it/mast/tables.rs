@@ -3,20 +3,13 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use serde_json::Value;
 use updraft::products::iso;
 
-use super::{analysed, number, values};
-use crate::cli::support::Bench;
+use super::{analysed, compared, number, values};
 
 /// Date and time of day of seconds since 1970, with a blank between.
 fn blank(time_s: f64) -> String {
     iso((time_s * 1000.0).round() as i64).replace('T', " ").trim_end_matches('Z').to_owned()
-}
-
-fn compared(bench: &Bench, mast: &str) -> Value {
-    let ended = bench.expect(0, &["compare", "out", "--mast", mast, "--json"]);
-    ended.json("updraft.mast-comparison/1")
 }
 
 /// What the drone says, as some program would write it: lines before the rows, and each row by its time and value.

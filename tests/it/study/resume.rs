@@ -18,7 +18,12 @@ fn cells(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .map(|entry| entry.unwrap().path())
         .filter_map(|path| {
             let name: String = path.file_name().unwrap().to_string_lossy().into();
-            Some((name, fs::read(path).ok()?))
+            let bytes = fs::read(path);
+            if bytes.is_err() && name.starts_with(".partial-") {
+                None
+            } else {
+                Some((name, bytes.unwrap()))
+            }
         })
         .collect()
 }
