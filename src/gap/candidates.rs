@@ -2,6 +2,7 @@
 //! of the air that look like them.
 
 use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
 
 use super::compare::Comparison;
 use super::decide::CLASS_NATS;
@@ -66,9 +67,66 @@ pub(super) struct Variant {
     pub column: Column,
     /// Updraft of the whole flight that goes with it, m/s; `None`: the one that the flight is taken in.
     pub updraft_mps: Option<f64>,
-    /// Contribution to the response to vertical air speed, by group and bin; empty if there is
-    /// none, or scatter does not show it.
-    pub felt: Vec<Vec<Response>>,
+    /// Contribution to the response to vertical air speed.
+    pub felt: Felt,
+}
+
+/// Contribution of a form to the response to vertical air speed, by group and bin; empty if there is none, or scatter does
+/// not show it. Few forms explain so much that it is asked for: it is computed then.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Felt(Option<Arc<Feeling>>);
+
+/// What a contribution to the response is computed from.
+#[derive(Debug)]
+struct Feeling {
+    scene: Scene,
+    vehicle: Vehicle,
+    /// Response without the form.
+    without: Arc<Vec<Vec<Response>>>,
+    felt: OnceLock<Vec<Vec<Response>>>,
+}
+
+impl Felt {
+    /// Of a vehicle in a scene, beside a response; `None`: it cannot be flown so.
+    fn of(scene: &Scene, vehicle: &Vehicle, without: &Arc<Vec<Vec<Response>>>) -> Option<Self> {
+        let feeling = Feeling {
+            scene: scene.clone(),
+            vehicle: vehicle.clone(),
+            without: Arc::clone(without),
+            felt: OnceLock::new(),
+        };
+        if !scene.surely_answers(vehicle) {
+            feeling.felt.set(feeling.computed()?).ok()?;
+        }
+        Some(Self(Some(Arc::new(feeling))))
+    }
+
+    /// By group and bin.
+    pub(super) fn get(&self) -> &[Vec<Response>] {
+        let Some(feeling) = &self.0 else { return &[] };
+        if let Some(felt) = feeling.felt.get() {
+            return felt;
+        }
+        // Nobody waits meanwhile: this thread may take up other work that asks for the same.
+        let felt = feeling.computed().unwrap_or_default();
+        feeling.felt.get_or_init(|| felt)
+    }
+
+    /// Whether scatter shows it.
+    pub(super) fn is_some(&self) -> bool {
+        !self.get().is_empty()
+    }
+}
+
+impl Feeling {
+    fn computed(&self) -> Option<Vec<Vec<Response>>> {
+        let mut felt = self.scene.response(&self.vehicle).ok()?;
+        response::add(&mut felt, -1.0, &self.without);
+        if is_hardly_felt(&felt, &self.without) {
+            felt.clear();
+        }
+        Some(felt)
+    }
 }
 
 /// Whether the whole flight may be in another updraft with an effect than without.
@@ -92,7 +150,7 @@ struct Base<'a> {
     comparison: &'a Comparison,
     updraft: Updraft,
     pulses: Column,
-    response: Vec<Vec<Response>>,
+    response: Arc<Vec<Vec<Response>>>,
 }
 
 impl<'a> Base<'a> {
@@ -102,7 +160,7 @@ impl<'a> Base<'a> {
         updraft: Updraft,
     ) -> Result<Self, EffectError> {
         let scene = comparison.scene_of(vehicle);
-        let (pulses, response) = (scene.pulses(vehicle)?, scene.response(vehicle)?);
+        let (pulses, response) = (scene.pulses(vehicle)?, Arc::new(scene.response(vehicle)?));
         Ok(Self { comparison, updraft, pulses, response })
     }
 
@@ -123,11 +181,7 @@ impl<'a> Base<'a> {
                 ),
             };
             let column = there.pulses(vehicle).ok()?.less(&self.pulses);
-            let mut felt = there.response(vehicle).ok()?;
-            response::add(&mut felt, -1.0, &self.response);
-            if is_hardly_felt(&felt, &self.response) {
-                felt.clear();
-            }
+            let felt = Felt::of(&there, vehicle, &self.response)?;
             let updraft_mps = (*shift_mps != 0.0).then_some(updraft_mps);
             Some(Variant {
                 vehicle: Some(vehicle.clone()),
@@ -409,7 +463,7 @@ pub(super) fn read_otherwise(
         // In the same updraft the response is the same, but for what closed forms leave out.
         variants.extend(forms.map(|form| match form.updraft_mps {
             Some(_) => form,
-            None => Variant { felt: Vec::new(), ..form },
+            None => Variant { felt: Felt::default(), ..form },
         }));
     }
     let parameter = place.parameter;
@@ -504,7 +558,7 @@ pub(super) fn of_the_air(
             price_nats: 0.0,
             column,
             updraft_mps: None,
-            felt: Vec::new(),
+            felt: Felt::default(),
         }],
     };
     vec![

@@ -249,12 +249,12 @@ fn overruled(standings: &[Option<f64>], rivals: &[Ranked]) -> Option<usize> {
 
 /// Whether the scatter between drones shows an effect.
 fn is_felt(candidate: &Candidate) -> bool {
-    candidate.variants.iter().any(|variant| !variant.felt.is_empty())
+    candidate.variants.iter().any(|variant| variant.felt.is_some())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::{Updraft, Variant, library};
+    use super::super::candidates::{Felt, Updraft, Variant, library};
     use super::super::data::Data;
     use super::super::search::round;
     use super::super::trial::{self, ranked};
@@ -322,7 +322,7 @@ mod tests {
                 price_nats: 0.0,
                 column,
                 updraft_mps: None,
-                felt: Vec::new(),
+                felt: Felt::default(),
             }],
         };
         let library = [air("one", line(1.0)), air("its like", line(2.0)), air("another", wave)];

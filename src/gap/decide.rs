@@ -211,7 +211,7 @@ fn left_with(
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::{Candidate, Size, Variant};
+    use super::super::candidates::{Candidate, Felt, Size, Variant};
     use super::super::gls::{Pulses, Split};
     use super::super::noise::{GroupPattern, Hyper};
     use super::super::trial::{patterns, pulses, ranked};
@@ -247,7 +247,7 @@ mod tests {
             price_nats: 0.0,
             column,
             updraft_mps: None,
-            felt: Vec::new(),
+            felt: Felt::default(),
         };
         Candidate {
             name,

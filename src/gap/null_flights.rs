@@ -7,7 +7,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::bins::{BinValues, of_segments};
-use super::candidates::{Candidate, Updraft, library, of_the_air, set};
+use super::candidates::{Candidate, Felt, Updraft, library, of_the_air, set};
 use super::compare::{Comparison, Simulated, thrust_exponent};
 use super::data::{Data, PlannedPart};
 use super::decide::CLASS_NATS;
@@ -202,7 +202,7 @@ fn scatter_between_drones_tells_inflow_from_drag() {
         .collect();
     let feeling = library(&vehicle, &comparison, Updraft::Same).unwrap();
     let mut numb = feeling.clone();
-    numb.iter_mut().flat_map(|one| &mut one.variants).for_each(|form| form.felt.clear());
+    numb.iter_mut().flat_map(|one| &mut one.variants).for_each(|form| form.felt = Felt::default());
     let is_sure = |ahead: &&f64| **ahead > CLASS_NATS;
     let (with, without) = (inflow_ahead(&feeling, &flights), inflow_ahead(&numb, &flights));
     let sure = |gains: &[f64]| gains.iter().filter(is_sure).count();

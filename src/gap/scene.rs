@@ -280,16 +280,20 @@ impl Scene {
         Ok(of_groups)
     }
 
+    /// Whether [`Scene::response`] has an answer for sure.
+    pub(super) fn surely_answers(&self, vehicle: &Vehicle) -> bool {
+        let Ok(steady) = self.steady(&calm(vehicle)) else { return false };
+        let hovers = self.each(&steady, |steady, _, at| Ok(steady.hovers(at)));
+        hovers.is_ok_and(|hovers| hovers.into_iter().flatten().all(|hovers| hovers))
+    }
+
     /// Response to vertical air speed of a model by group and bin: by the whole model, so that effects that
     /// build on the rest of it are in it.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Response>>, EffectError> {
-        let mut calm = vehicle.clone();
-        // What shakes has a scatter of its own, which hides how it answers gusts.
-        calm.effects.retain(|name, _| !shakes(name));
-        let steady = self.steady(&calm)?;
+        let steady = self.steady(&calm(vehicle))?;
         self.each(&steady, |steady, _, at| steady.response(at))
     }
 
@@ -335,6 +339,13 @@ impl Scene {
             Ok(pulses_us)
         })
     }
+}
+
+/// A vehicle without what shakes: that has a scatter of its own, which hides how it answers gusts.
+fn calm(vehicle: &Vehicle) -> Vehicle {
+    let mut calm = vehicle.clone();
+    calm.effects.retain(|name, _| !shakes(name));
+    calm
 }
 
 /// Whether an effect has a scatter of its own.

@@ -239,11 +239,11 @@ fn refit(
     // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
     let feeling = |beta: &[f64]| {
         let beta = beta.last().copied().unwrap_or(0.0);
-        feeling(problem.groups, &[&variant.felt], &[beta])
+        feeling(problem.groups, &[variant.felt.get()], &[beta])
     };
     if settles && candidate.size.is_some() {
         with = settled(&problem, with, feeling).1;
-    } else if !variant.felt.is_empty() {
+    } else if variant.felt.is_some() {
         with = problem.among(&feeling(&with.beta)).fit(with.hyper, Likelihood::Profile);
     }
     let beta = with.beta.last().copied().unwrap_or(0.0);
@@ -267,7 +267,7 @@ fn refit(
 /// Groups whose response to the air has some multiples of others.
 pub(super) fn feeling(
     groups: &[GroupPattern],
-    felt: &[&Vec<Vec<Response>>],
+    felt: &[&[Vec<Response>]],
     beta: &[f64],
 ) -> Vec<GroupPattern> {
     let mut groups = groups.to_vec();
@@ -324,7 +324,7 @@ fn free_shapes(
                 with = settled(&problem, with, |_| problem.groups.to_vec()).1;
             }
             let plain = found.plain.max(with.log_posterior() - before - generic.penalty);
-            let felt: Vec<_> = generic.felt.iter().collect();
+            let felt: Vec<_> = generic.felt.iter().map(Vec::as_slice).collect();
             let feeling = |beta: &[f64]| feeling(problem.groups, &felt, &beta[first..]);
             if !felt.is_empty() {
                 let numb = with.clone();
@@ -562,7 +562,7 @@ mod tests {
 
     #[test]
     fn a_size_that_an_effect_cannot_have_is_none() {
-        use super::super::candidates::Size;
+        use super::super::candidates::{Felt, Size};
         let column = Column::Shared(vec![]);
         let variant = Variant {
             vehicle: None,
@@ -571,7 +571,7 @@ mod tests {
             price_nats: 0.0,
             column,
             updraft_mps: None,
-            felt: Vec::new(),
+            felt: Felt::default(),
         };
         let size = Size { name: "size", unit: "", low: 0.0, high: 0.5, now: 0.1, usual: 0.1 };
         let (was_there, by_lean) = (false, false);

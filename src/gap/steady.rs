@@ -173,6 +173,15 @@ impl Steady {
         })
     }
 
+    /// Whether the vehicle hovers in a moment's air: then it has a pulse at any climb there.
+    pub(super) fn hovers(&mut self, at: &Moment) -> bool {
+        let (hover, supply) = (at.climbing(0.0), Supply::Used(at.signals.charge_used_ah));
+        let balance = self.trim.balance(&self.condition(&hover, Supply::Used(0.0), 0.0));
+        balance.is_some_and(|balance| {
+            self.trim.pulse_us(&balance, &self.condition(&hover, supply, 0.0)).is_some()
+        })
+    }
+
     /// Response to vertical air speed at a moment.
     ///
     /// # Errors
