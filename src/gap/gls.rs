@@ -5,7 +5,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::numeric::{extent, mean};
 
+use super::memory::{Digest, Memory};
 use super::noise::{COUNT, GroupPattern, Hyper, Whitener};
+use super::response::Response;
 use crate::numeric::minimise_known;
 
 /// Values of all drones, by group, drone and bin.
@@ -204,6 +206,9 @@ impl White {
     }
 }
 
+/// Noise that was fitted: of several flights' searches.
+static FITTED: Memory<Hyper> = Memory::of(20_000);
+
 /// A problem: measured against the model, and the regressors that are in the model already.
 #[derive(Clone, Debug)]
 pub(super) struct Problem<'a> {
@@ -286,6 +291,39 @@ impl<'a> Problem<'a> {
 
     /// Most probable noise from a start, with everything linear at its best.
     pub(super) fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
+        let mut digest = self.digest();
+        digest.add_all(&start.0);
+        digest.add(u64::from(likelihood == Likelihood::Restricted));
+        if let Some(hyper) = FITTED.get(digest) {
+            return self.at(&hyper);
+        }
+        let fitted = self.fitted(start, likelihood);
+        FITTED.keep(digest, fitted.hyper);
+        fitted
+    }
+
+    /// All that a fit follows from but its start.
+    fn digest(&self) -> Digest {
+        let mut digest = Digest::new();
+        digest.add(self.groups.len() as u64);
+        for group in self.groups {
+            digest.add(group.drones as u64);
+            let GroupPattern { time_s, height_m, shift_mps, bent_us, slope_us, .. } = group;
+            for values in [time_s, height_m, shift_mps, bent_us, slope_us] {
+                digest.add_all(values);
+            }
+            digest.add_all(group.response.iter().flat_map(Response::values));
+            digest.add_all(group.side_response.iter().flatten());
+        }
+        for split in [self.pulses].into_iter().chain(&self.columns) {
+            digest.add(u64::from(split.is_doubt));
+            split.means.iter().for_each(|means| digest.add_all(means));
+            split.deviations.iter().flatten().for_each(|drone| digest.add_all(drone));
+        }
+        digest
+    }
+
+    fn fitted(&self, start: Hyper, likelihood: Likelihood) -> Solution {
         let objective = |at: &[f64; COUNT]| {
             let solution = self.at(&Hyper(*at));
             let likely = solution.log_likelihood(likelihood) + solution.hyper.log_prior();
@@ -554,7 +592,6 @@ mod tests {
         GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME, SLOPES,
         WHITE,
     };
-    use super::super::response::Response;
     use super::super::trial::{patterns, pulses};
     use super::*;
 

@@ -30,6 +30,7 @@ pub mod left_out;
 mod make;
 mod map_gain;
 mod measure;
+mod memory;
 mod model_flights;
 pub mod next;
 mod noise;

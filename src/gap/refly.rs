@@ -3,12 +3,16 @@
 use std::io;
 
 use super::bins::{Bin, BinValues};
+use super::memory::{Digest, Memory};
 use crate::base::time::GpsTime;
 use crate::effects::{Role, find};
 use crate::mission::plan::{Plan, Slot};
 use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
+
+/// Bins of flights that were flown: those of one flight's searches, some megabytes.
+static FLOWN: Memory<Vec<Option<BinValues>>> = Memory::of(1_000);
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
@@ -52,6 +56,13 @@ pub(super) fn refly(
 ) -> Result<Vec<Option<BinValues>>, SimError> {
     let trajectory = plan.trajectory(slot);
     let vehicle = &without_jitter(vehicle);
+    let mut digest = Digest::new();
+    digest.add_debug(&(vehicle, &trajectory, slot.slot, slot.home_m, &plan.site, bins));
+    digest.add_all(&air_mps);
+    digest.add_all([&thrust_exponent]);
+    if let Some(values) = FLOWN.get(digest) {
+        return Ok(values);
+    }
     let air = Uniform(air_mps.into());
     let setup = FlightSetup {
         vehicle,
@@ -68,7 +79,9 @@ pub(super) fn refly(
     };
     let mut recorder = BinRecorder::new(bins, slot.home_m[2]);
     fly_with(&setup, &mut recorder)?;
-    Ok(recorder.values(thrust_exponent))
+    let values = recorder.values(thrust_exponent);
+    FLOWN.keep(digest, values.clone());
+    Ok(values)
 }
 
 struct Sums {

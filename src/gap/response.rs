@@ -30,6 +30,11 @@ impl Response {
         Self([slope; COUNT])
     }
 
+    /// All its values.
+    pub(super) fn values(&self) -> &[f64; COUNT] {
+        &self.0
+    }
+
     /// Response at a speed shifted by `shift_mps`, us/(m/s); held beyond the last step.
     pub(super) fn at(&self, shift_mps: f64) -> f64 {
         let place = (shift_mps / STEP_MPS + STEPS as f64).clamp(0.0, (COUNT - 1) as f64);
