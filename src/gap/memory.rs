@@ -90,7 +90,9 @@ mod tests {
 
     fn digest(parts: &[&[f64]]) -> Digest {
         let mut digest = Digest::new();
-        parts.iter().for_each(|part| digest.add_all(*part));
+        for part in parts {
+            digest.add_all(*part);
+        }
         digest
     }
 
