@@ -65,6 +65,7 @@ impl Dependence {
 
     /// Whether an effect that depends on a signal may depend on this.
     pub(super) fn is_of(self, signal: Signal) -> bool {
+        let signal = felt_as(signal);
         match self {
             Self::Climb => signal == Signal::Climb,
             Self::ClimbTime => matches!(signal, Signal::Climb | Signal::Time),

@@ -10,7 +10,7 @@ use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Column, Problem, Pulses, Split};
 use super::noise::{GroupPattern, Hyper};
-use super::refine::refine;
+use super::refine::{doubts, refine};
 use super::refly::mean_drone;
 use super::response::Response;
 use super::verdict::{Gap, Interval, Shrink};
@@ -105,8 +105,8 @@ impl Case<'_> {
 
     fn shrink(&self, residuals: &Residuals<'_>, fitted: &Fitted) -> Shrink {
         let counts: Vec<usize> = residuals.after.iter().map(Vec::len).collect();
-        let Fitted { patterns, .. } = fitted;
-        let floor_us = floor(patterns, &counts, &self.found.hyper, self.seed);
+        let Fitted { patterns, doubts, .. } = fitted;
+        let floor_us = floor(patterns, doubts, &counts, &self.found.hyper, self.seed);
         shrink(residuals, floor_us, self.seed)
     }
 
@@ -188,6 +188,8 @@ struct Fitted {
     /// What the free shapes say in each bin.
     shapes: Vec<Vec<f64>>,
     segments: Vec<Vec<usize>>,
+    /// What is not known of the air and of the forms of drag and lift; none of it is missing physics.
+    doubts: Vec<Column>,
 }
 
 impl Fitted {
@@ -208,25 +210,39 @@ impl Fitted {
         let shapes = patterns.iter().enumerate().map(bins).collect();
         let of = |group: &super::data::Group| group.bins.iter().map(|bin| bin.segment).collect();
         let segments = comparison.data.groups.iter().map(of).collect();
-        Ok(Self { patterns, residual, shapes, segments })
+        let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
+        Ok(Self { patterns, residual, shapes, segments, doubts })
     }
 
     /// What the shared air does to the pulse, by these residuals of the fitted drones.
     fn air(&self, residual: &Pulses, found: &Found) -> Vec<Vec<f64>> {
-        shared_us(&self.patterns, residual, &found.hyper)
+        shared_us(&self.patterns, residual, &self.doubts, &found.hyper)
     }
 }
 
-/// What the updraft that these drones share does to the pulse, by group and bin, us.
-fn shared_us(patterns: &[GroupPattern], residual: &Pulses, hyper: &Hyper) -> Vec<Vec<f64>> {
+/// What the air that these drones share does to the pulse, by group and bin, us: its updraft, and its wind as far as that and the
+/// forms of drag and lift are in doubt.
+fn shared_us(
+    patterns: &[GroupPattern],
+    residual: &Pulses,
+    doubts: &[Column],
+    hyper: &Hyper,
+) -> Vec<Vec<f64>> {
     let split = Split::of(residual);
-    let problem = Problem::new(patterns, &split);
-    let shared = problem.shared_mps(&problem.at(hyper));
+    let problem = Problem::new(patterns, &split).doubting(doubts);
+    let solution = problem.at(hyper);
+    let shared = problem.shared_mps(&solution);
     let of = |(pattern, shared): (&GroupPattern, Vec<f64>)| {
         let responses = pattern.responses(hyper);
         shared.iter().zip(responses).map(|(mps, response)| mps * response).collect()
     };
-    patterns.iter().zip(shared).map(of).collect()
+    let mut air: Vec<Vec<f64>> = patterns.iter().zip(shared).map(of).collect();
+    for (doubt, beta) in doubts.iter().zip(solution.beta.iter().skip(1)) {
+        for (air, means) in air.iter_mut().zip(doubt.means()) {
+            air.iter_mut().zip(means).for_each(|(air, mean)| *air += beta * mean);
+        }
+    }
+    air
 }
 
 /// A comparison with only the bins of another.
@@ -355,7 +371,13 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
 
 /// What noise and the air that is not known leave of held-out drones, us: the same sums on simulated
 /// flights.
-fn floor(patterns: &[GroupPattern], held: &[usize], hyper: &Hyper, seed: u64) -> f64 {
+fn floor(
+    patterns: &[GroupPattern],
+    doubts: &[Column],
+    held: &[usize],
+    hyper: &Hyper,
+    seed: u64,
+) -> f64 {
     // Fitted and held-out drones together, so that they share the air.
     let both: Vec<GroupPattern> = patterns
         .iter()
@@ -372,7 +394,7 @@ fn floor(patterns: &[GroupPattern], held: &[usize], hyper: &Hyper, seed: u64) ->
             .zip(patterns)
             .map(|(drones, group)| drones.iter().take(group.drones).cloned().collect())
             .collect();
-        let air = shared_us(patterns, &fitted, hyper);
+        let air = shared_us(patterns, &fitted, doubts, hyper);
         for ((drones, group), air) in pulses.iter().zip(patterns).zip(&air) {
             for drone in drones.iter().skip(group.drones) {
                 let rest: Vec<f64> = drone.iter().zip(air).map(|(v, a)| v - a).collect();
@@ -509,8 +531,8 @@ mod tests {
         hyper.0[super::super::noise::GUST_TIME] = f64::ln(8.0);
         hyper.0[WHITE] = f64::ln(2.0);
         let patterns = trial::patterns();
-        let found = floor(&patterns, &[2, 1], &hyper, 1);
+        let found = floor(&patterns, &[], &[2, 1], &hyper, 1);
         assert!((found - 2.0 * (5.0_f64 / 6.0).sqrt()).abs() < 0.15, "{found}");
-        assert_eq!(floor(&patterns, &[0, 0], &hyper, 1), 0.0, "nobody is held out");
+        assert_eq!(floor(&patterns, &[], &[0, 0], &hyper, 1), 0.0, "nobody is held out");
     }
 }

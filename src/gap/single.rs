@@ -24,8 +24,17 @@ const UNKNOWN_SHARE: f64 = 0.5;
 /// physics left up to a seventh.
 const SMALL: f64 = 0.2;
 
+/// A free shape that is left must explain so much to be told beside a name of the same kind, nats: less than to be found, since
+/// something is there.
+const LEFT_NATS: f64 = 10.0;
+/// And this share of what the name explains. Chosen: other forms of the same physics left up to a seventh.
+const LEFT_SHARE: f64 = 1.0 / 7.0;
+
 /// Share of a name's gain that a rival must have to stand for it. Chosen.
 const RIVAL_SHARE: f64 = 0.25;
+
+/// Wind in which drag of a body is nearly linear in the climb, m/s: half of the fastest climbs of ladders. Chosen.
+const LEAST_WIND_MPS: f64 = 2.0;
 
 /// Shapes of the climb that a flight whose response changes with time must be told from: as many as an unknown that
 /// depends on climb may have.
@@ -42,6 +51,7 @@ pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     beside_something_larger(&mut found.steps);
     beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
+    beside_drag_of_the_body(found);
     Ok(())
 }
 
@@ -192,21 +202,37 @@ fn beside_what_the_air_may_be(steps: &mut [Step]) {
     }
 }
 
-/// Names beside a free shape that is left above its threshold, depends on the same and explains a fair share of what the
-/// name does: an effect is named alone only if it leaves nothing of its kind. What is left may be no finding because it
-/// hardly matters, or because only the scatter between drones shows it.
+/// Names beside a free shape that is left, depends on the same and explains a fair share of what the name does: an effect is
+/// named alone only if it leaves nothing of its kind. What is left may be no finding because it hardly matters, or because only
+/// the scatter between drones shows it.
 fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
-    if rest.gain_nats <= FREE_FLOOR_NATS.max(rest.threshold_nats) {
-        return;
-    }
     for step in steps {
         let Some(effect) = new_name(step) else { continue };
-        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal))
-            // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
-            || depends_on.is_of_air() && is_of_air(effect);
-        let other = alike && rest.gain_nats > RIVAL_SHARE * step.gain_nats;
-        doubt(step, other.then(|| depends_on.name().to_owned()));
+        let looks = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
+        // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
+        let meets = depends_on.is_of_air() && is_of_air(effect);
+        let is_left = looks && rest.gain_nats > LEFT_NATS.max(LEFT_SHARE * step.gain_nats)
+            || meets
+                && rest.gain_nats > FREE_FLOOR_NATS.max(rest.threshold_nats)
+                && rest.gain_nats > RIVAL_SHARE * step.gain_nats;
+        doubt(step, is_left.then(|| depends_on.name().to_owned()));
+    }
+}
+
+/// Momentum drag in wind, where no leg of known speed over ground told the wind: a body's drag is of the same form there, as
+/// the square of a speed that hardly changes is, and each reads another wind from the leans.
+fn beside_drag_of_the_body(found: &mut Found) {
+    let comparison = &found.comparison;
+    let [x_mps, y_mps] = comparison.wind.mean_mps;
+    let is_told = comparison.is_foreign() || comparison.wind.measured.is_some();
+    if is_told || x_mps.hypot(y_mps) < LEAST_WIND_MPS {
+        return;
+    }
+    for step in &mut found.steps {
+        let is_drag = new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect));
+        let bodies = [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter_map(Role::place);
+        doubt(step, bodies.map(|place| place.name().to_owned()).filter(|_| is_drag));
     }
 }
 
@@ -238,7 +264,9 @@ pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>
 
 #[cfg(test)]
 mod tests {
+    use super::super::compare::lean_law;
     use super::super::data::Group;
+    use super::super::lean::Measured;
     use super::super::trial::{self, name};
     use super::*;
     use crate::gap::refine::size_of;
@@ -377,18 +405,43 @@ mod tests {
 
     #[test]
     fn a_name_that_leaves_much_of_its_kind_is_a_class() {
-        let with = |own_nats: f64, candidate: &str, gain_nats: f64| {
-            let mut steps = [step(name("face-drag"), own_nats, 9.0, &[])];
+        let of = |effect: &str, own_nats: f64, candidate: &str, gain_nats: f64| {
+            let mut steps = [step(name(effect), own_nats, 9.0, &[])];
             let candidate = candidate.to_owned();
             beside_what_is_left(&mut steps, &Rest { gain_nats, candidate, ..Rest::default() });
             told(&steps).concat()
         };
-        let told_with = |candidate: &str, gain_nats: f64| with(80.0, candidate, gain_nats);
-        assert_eq!(told_with("climb", 20.0), "face-drag");
-        assert_eq!(told_with("climb", 20.0 + 1e-9), "face-drag climb");
-        assert_eq!(told_with("wind", 20.0 + 1e-9), "face-drag wind", "a body feels the whole air");
+        let told_with =
+            |candidate: &str, gain_nats: f64| of("face-drag", 84.0, candidate, gain_nats);
+        assert_eq!(told_with("climb", 12.0), "face-drag");
+        assert_eq!(told_with("climb", 12.0 + 1e-9), "face-drag climb");
+        assert_eq!(told_with("wind", 21.0), "face-drag");
+        assert_eq!(told_with("wind", 21.0 + 1e-9), "face-drag wind", "a body feels the whole air");
         assert_eq!(told_with("voltage", 90.0), "face-drag", "a drag has no battery");
         assert_eq!(told_with("rotor-inflow", 90.0), "face-drag", "an effect is none of them");
-        assert_eq!(with(10.0, "climb", 14.0), "face-drag", "not above what chance gains");
+        assert_eq!(of("face-drag", 20.0, "climb", 10.0), "face-drag", "chance gains as much");
+        assert_eq!(of("face-drag", 20.0, "wind", 14.0), "face-drag", "chance gains as much");
+        let curve = of("thrust-curve", 84.0, "climb-time", 67.0);
+        assert_eq!(curve, "thrust-curve climb-time", "it feels the climb by the model's pulse");
+    }
+
+    #[test]
+    fn momentum_drag_without_legs_may_be_a_bodys() {
+        let data = trial::data(2, |_, _| 0.0);
+        let of = |effect: &str, wind_mps: [f64; 2], measured: bool| {
+            let mut found = Found::nothing(trial::comparison(&data));
+            let law = lean_law(&found.comparison.vehicle, 0.0, 0.0);
+            let wind = &mut found.comparison.wind;
+            wind.mean_mps = wind_mps;
+            wind.measured = measured.then_some(Measured { law, linear_se: 1e-3 });
+            found.steps = vec![step(name(effect), 118.0, 19.0, &[])];
+            beside_drag_of_the_body(&mut found);
+            told(&found.steps).concat()
+        };
+        let wind = [3.0, -4.0];
+        assert_eq!(of("momentum-drag", wind, false), "momentum-drag parasitic-drag face-drag");
+        assert_eq!(of("momentum-drag", wind, true), "momentum-drag", "legs told the wind");
+        assert_eq!(of("momentum-drag", [1.0, -1.0], false), "momentum-drag", "hardly any wind");
+        assert_eq!(of("rotor-inflow", wind, false), "rotor-inflow");
     }
 }

@@ -11,21 +11,53 @@ pub fn cross(a: &Record, b: &Record, lags: usize) -> Vec<f64> {
     products(a.anomalies().values(), b.anomalies().values(), lags)
 }
 
+/// Lags that are summed side by side.
+const LANES: usize = 8;
+
 /// Mean products of values with later ones, by lag; NaN where no pair is known.
 pub(crate) fn products(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
-    let at = |lag: usize| {
-        let later = b.get(lag..).unwrap_or_default();
-        let (mut sum, mut count) = (0.0, 0usize);
-        for (one, other) in a.iter().zip(later) {
-            let product = one * other;
-            if !product.is_nan() {
-                sum += product;
-                count += 1;
+    if a.len() == b.len() && a.iter().chain(b).all(|value| value.is_finite()) {
+        return (0..=lags).step_by(LANES).flat_map(|first| whole(a, b, first, lags)).collect();
+    }
+    (0..=lags)
+        .map(|lag| {
+            let later = b.get(lag..).unwrap_or_default();
+            let (mut sum, mut count) = (0.0, 0usize);
+            for (one, other) in a.iter().zip(later) {
+                let product = one * other;
+                if !product.is_nan() {
+                    sum += product;
+                    count += 1;
+                }
             }
+            if count == 0 { f64::NAN } else { sum / count as f64 }
+        })
+        .collect()
+}
+
+/// Mean products of records without gaps at some lags: each sum in the order of the record, several at a time.
+fn whole(a: &[f64], b: &[f64], first: usize, lags: usize) -> impl Iterator<Item = f64> {
+    let mut sums = [0.0; LANES];
+    let later = b.get(first..).unwrap_or_default();
+    let full = later.windows(LANES);
+    let done = full.len();
+    for (one, others) in a.iter().zip(full) {
+        for (sum, other) in sums.iter_mut().zip(others) {
+            *sum += one * other;
         }
-        if count == 0 { f64::NAN } else { sum / count as f64 }
-    };
-    (0..=lags).map(at).collect()
+    }
+    // Near the end the later lags have no partner any more.
+    for (place, one) in a.iter().enumerate().skip(done) {
+        let others = later.get(place..).unwrap_or_default();
+        for (sum, other) in sums.iter_mut().zip(others) {
+            *sum += one * other;
+        }
+    }
+    let pairs = later.len();
+    (0..LANES.min(lags + 1 - first)).map(move |lane| {
+        let count = pairs.saturating_sub(lane);
+        if count == 0 { f64::NAN } else { sums[lane] / count as f64 }
+    })
 }
 
 /// Covariance of a record with itself, at lags of 0, 1, ... steps up to `lags`.
@@ -68,21 +100,23 @@ impl Exponential {
         // Beyond the first zero it is what one realisation happens to be.
         let used = autocovariance.get(from..end.max(from + 3)).filter(|used| used.len() >= 3)?;
         let mut best: Option<(f64, Self)> = None;
+        let mut shape = Vec::with_capacity(used.len());
         let mut time_s = 0.3 * step_s;
         while time_s < length_s {
             let share = share_in_mean(time_s, length_s);
-            let shape = |k: usize| (-((from + k) as f64) * step_s / time_s).exp() - share;
+            shape.clear();
+            shape.extend(
+                (from..from + used.len())
+                    .map(|lag| (-(lag as f64) * step_s / time_s).exp() - share),
+            );
             let (mut cross, mut square) = (0.0, 0.0);
-            for (k, value) in used.iter().enumerate() {
-                cross += shape(k) * value;
-                square += shape(k).powi(2);
+            for (shape, value) in shape.iter().zip(used) {
+                cross += shape * value;
+                square += shape.powi(2);
             }
             let variance = cross / square;
-            let left: f64 = used
-                .iter()
-                .enumerate()
-                .map(|(k, value)| (value - variance * shape(k)).powi(2))
-                .sum();
+            let each = shape.iter().zip(used);
+            let left: f64 = each.map(|(shape, value)| (value - variance * shape).powi(2)).sum();
             if variance > 0.0 && best.as_ref().is_none_or(|(least, _)| left < *least) {
                 best = Some((left, Self { variance, time_s, in_mean: share }));
             }
@@ -106,6 +140,26 @@ mod tests {
         assert_eq!(cross(&a, &b, 0), [(3.0 + 0.0 + 3.0) / 3.0]);
         assert!(cross(&a, &Record::new(0.5, [Some(1.0)]), 0)[0].is_nan());
         assert!(auto(&a, 7)[6].is_nan());
+    }
+
+    #[test]
+    fn lags_side_by_side_are_those_one_by_one() {
+        let value = |place: usize| (place as f64 * 1.7).sin() + 0.3 * (place as f64 * 0.31).cos();
+        let a: Vec<f64> = (0..37).map(value).collect();
+        let b: Vec<f64> = (50..87).map(value).collect();
+        let by_hand = |lag: usize| {
+            let sum = a.iter().zip(&b[lag.min(37)..]).fold(0.0, |sum, (a, b)| sum + a * b);
+            sum / (37 - lag) as f64
+        };
+        let found = products(&a, &b, 40);
+        assert_eq!(found.len(), 41);
+        for (lag, found) in found.iter().enumerate() {
+            if lag < 37 {
+                assert_eq!(found.to_bits(), by_hand(lag).to_bits(), "{lag}");
+            } else {
+                assert!(found.is_nan(), "{lag}");
+            }
+        }
     }
 
     #[test]

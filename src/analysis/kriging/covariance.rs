@@ -101,6 +101,22 @@ pub(super) struct Spot {
     pub(super) velocity_mps: [f64; 3],
 }
 
+/// What drones show besides the field.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Besides {
+    own_stretch: f64,
+    gusts: f64,
+    shared: f64,
+}
+
+impl Besides {
+    /// Covariance of the means of one drone, or of two, by that of the field, (m/s)².
+    pub(super) fn with(&self, field: f64, is_own: bool) -> f64 {
+        let air = if is_own { self.own_stretch * field + self.gusts } else { field };
+        air + self.shared
+    }
+}
+
 /// The covariance function of an air, with what does not depend on the spots computed once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Covariance {
@@ -137,6 +153,15 @@ impl Covariance {
         let is_own = one.drone.is_some() && one.drone == other.drone;
         self.covariance(one, other, if is_own { 1.0 + self.slopes } else { 1.0 })
             + self.shared(one.time_s - other.time_s)
+    }
+
+    /// What drones that stand still show so many seconds apart, besides the field.
+    pub(super) fn besides(&self, apart_s: f64) -> Besides {
+        Besides {
+            own_stretch: 1.0 + self.slopes,
+            gusts: self.gusts(apart_s),
+            shared: self.shared(apart_s),
+        }
     }
 
     /// Covariance of a mean of the air itself with one that a drone shows, (m/s)².

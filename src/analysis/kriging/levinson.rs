@@ -6,9 +6,9 @@
 //! field says about its own mean, and about the errors that all drones share, is spread over the whole record: by 16
 //! neighbours the zero of a field of 200 m and 260 s is known to 0.23 m/s, and by all values to 0.17.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView};
 
-use super::covariance::{Covariance, Spot};
+use super::covariance::Covariance;
 use super::data::{COMMON, Drone, Rows};
 use super::vecchia::{Common, CommonVector, Parts, System};
 
@@ -30,10 +30,13 @@ const KEPT_SHARE: f64 = 0.5;
 pub(super) struct Blocks {
     /// Index of each channel's drone.
     drones: Vec<usize>,
-    places_m: Vec<[f64; 3]>,
+    /// Ways from one channel to another, each once, m; and which of them it is from each channel (row) to each other.
+    ways_m: Vec<[f64; 3]>,
+    way: DMatrix<usize>,
     noise_mps: Vec<f64>,
-    /// Of each step: a row for each channel, with its value and what the common errors add to it.
-    records: Vec<DMatrix<f64>>,
+    /// Of each step, the last one first: a row for each channel, with its value and what the common errors add to it.
+    records: DMatrix<f64>,
+    steps: usize,
     step_s: f64,
     /// Steps that predict.
     order: usize,
@@ -68,20 +71,17 @@ impl Blocks {
         let place_m = |drone: &usize| drones[*drone].place_at(0).unwrap_or_default();
         let channels = spread(&whole, size.drones, place_m);
         let row = |drone: usize, step: usize| Some(&rows.list[rows.place[drone][step]?]);
-        let records: Option<Vec<DMatrix<f64>>> = steps
-            .clone()
-            .map(|step| {
-                let mut record = DMatrix::zeros(channels.len(), 1 + COMMON);
-                for (channel, drone) in channels.iter().enumerate() {
-                    let row = row(*drone, step)?;
-                    record[(channel, 0)] = row.value_mps;
-                    for column in 0..COMMON {
-                        record[(channel, 1 + column)] = row.common[column];
-                    }
+        let mut records = DMatrix::zeros(steps.len() * channels.len(), 1 + COMMON);
+        for (block, step) in steps.clone().rev().enumerate() {
+            for (channel, drone) in channels.iter().enumerate() {
+                let row = row(*drone, step)?;
+                let place = block * channels.len() + channel;
+                records[(place, 0)] = row.value_mps;
+                for column in 0..COMMON {
+                    records[(place, 1 + column)] = row.common[column];
                 }
-                Some(record)
-            })
-            .collect();
+            }
+        }
         let noise = |drone: &usize| {
             let squares =
                 steps.clone().filter_map(|step| Some(row(*drone, step)?.noise_mps.powi(2)));
@@ -89,66 +89,65 @@ impl Blocks {
         };
         let cube = (channels.len() as f64).powi(3);
         let order = ((size.operations / (3.0 * cube)).sqrt() as usize).max(1);
+        let (ways_m, way) = ways(&channels.iter().map(place_m).collect::<Vec<_>>());
         Some(Self {
-            places_m: channels.iter().map(place_m).collect(),
+            ways_m,
+            way,
             noise_mps: channels.iter().map(noise).collect(),
             drones: channels,
-            records: records?,
+            records,
+            steps: steps.len(),
             step_s: (rows.seconds[1] - rows.seconds[0]) as f64,
             order,
         })
     }
 
-    /// Covariance of all channels with all channels so many steps before, (m/s)².
-    fn lagged(&self, covariance: &Covariance, lag: usize) -> DMatrix<f64> {
-        let spot = |channel: usize, time_s: f64| Spot {
-            place_m: self.places_m[channel],
-            time_s,
-            drone: Some(self.drones[channel]),
-            velocity_mps: [0.0; 3],
-        };
+    /// Covariances of all channels with all channels so many steps before, (m/s)²: that of the most steps first.
+    fn lagged(&self, covariance: &Covariance, order: usize) -> DMatrix<f64> {
         let n = self.drones.len();
-        let apart_s = lag as f64 * self.step_s;
-        let is_symmetric = lag == 0 || covariance.is_reversible();
-        let mut matrix = DMatrix::zeros(n, n);
-        for row in 0..n {
-            for column in 0..if is_symmetric { row + 1 } else { n } {
-                let value = covariance.of(&spot(row, apart_s), &spot(column, 0.0));
-                matrix[(row, column)] = value;
-                if is_symmetric {
-                    matrix[(column, row)] = value;
-                }
+        let mut stacked = DMatrix::zeros((order + 1) * n, n);
+        let mut fields = vec![0.0; self.ways_m.len()];
+        for lag in 0..=order {
+            let apart_s = lag as f64 * self.step_s;
+            let besides = covariance.besides(apart_s);
+            for (field, way_m) in fields.iter_mut().zip(&self.ways_m) {
+                *field = covariance.field(*way_m, apart_s);
+            }
+            let mut block = stacked.rows_mut((order - lag) * n, n);
+            for (value, (place, way)) in block.iter_mut().zip(self.way.iter().enumerate()) {
+                *value = besides.with(fields[*way], place % n == place / n);
             }
             if lag == 0 {
-                matrix[(row, row)] += self.noise_mps[row].powi(2);
+                let noise = self.noise_mps.iter().enumerate();
+                noise.for_each(|(channel, mps)| block[(channel, channel)] += mps * mps);
             }
         }
-        matrix
+        stacked
     }
 
     /// The likelihood with everything linear left open; `own_mps` are standard errors of all drones' constants. `None`
     /// where rounding leaves no positive definite covariance.
     pub(super) fn system(&self, covariance: &Covariance, own_mps: &[f64]) -> Option<System> {
         let n = self.drones.len();
-        let order = self.order.min(self.records.len() - 1);
-        let lagged: Vec<DMatrix<f64>> =
-            (0..=order).map(|lag| self.lagged(covariance, lag)).collect();
-        let mut predictor = Predictor::new(&lagged[0], covariance.is_reversible());
+        let order = self.order.min(self.steps - 1);
+        let lagged = self.lagged(covariance, order);
+        let mut predictor = Predictor::new(lagged, n, covariance.is_reversible());
         let mut parts = Parts::new(n);
         let mut square = DMatrix::zeros(n, n);
-        for (step, record) in self.records.iter().enumerate() {
+        let mut left = DMatrix::zeros(n, 1 + COMMON);
+        for step in 0..self.steps {
             if step <= order {
                 if step > 0 {
-                    predictor.extend(&lagged)?;
+                    predictor.extend()?;
                 }
                 let white = predictor.factor()?.solve_lower_triangular(&predictor.of_constants)?;
                 square = white.tr_mul(&white);
                 predictor.white_constants = white;
             }
-            let mut left = record.clone();
-            for (back, ahead) in predictor.ahead.iter().enumerate() {
-                left.gemm(-1.0, ahead, &self.records[step - 1 - back], 1.0);
-            }
+            let block = self.steps - 1 - step;
+            left.copy_from(&self.records.rows(block * n, n));
+            let before = self.records.rows((block + 1) * n, predictor.order * n);
+            left.gemm(-1.0, &predictor.ahead(), &before, 1.0);
             predictor.factor()?.solve_lower_triangular_mut(&mut left);
             let value = left.column(0);
             let common = left.columns(1, COMMON);
@@ -167,11 +166,21 @@ impl Blocks {
 }
 
 /// The best prediction of a step by those before it, and of a step by those behind it.
+///
+/// Coefficients lie side by side, so that sums over the steps are products of long matrices.
 struct Predictor {
+    /// Covariances, that of the most steps first, one below the other.
+    lagged: DMatrix<f64>,
+    /// Most steps that predict.
+    most: usize,
+    /// Steps that predict.
+    order: usize,
     /// What is multiplied with the steps before, the last one first.
-    ahead: Vec<DMatrix<f64>>,
-    /// What is multiplied with the steps behind; the same as `ahead` where time has no direction, and then not kept.
-    behind: Option<Vec<DMatrix<f64>>>,
+    ahead: DMatrix<f64>,
+    /// What is multiplied with the steps behind, the farthest first; it ends with the matrix. The same as `ahead` where time
+    /// has no direction.
+    behind: DMatrix<f64>,
+    is_reversible: bool,
     /// Covariance of what is left.
     left: DMatrix<f64>,
     left_behind: DMatrix<f64>,
@@ -179,23 +188,34 @@ struct Predictor {
     factor: Option<DMatrix<f64>>,
     /// Sum of the logarithms of its diagonal.
     ln_sd: f64,
-    /// What is left of constants of the channels.
+    /// What is left of constants of the channels, ahead and behind.
     of_constants: DMatrix<f64>,
+    of_constants_behind: DMatrix<f64>,
     white_constants: DMatrix<f64>,
+    /// What was `ahead` before the last step.
+    before: DMatrix<f64>,
 }
 
 impl Predictor {
-    fn new(variance: &DMatrix<f64>, is_reversible: bool) -> Self {
-        let n = variance.nrows();
+    fn new(lagged: DMatrix<f64>, n: usize, is_reversible: bool) -> Self {
+        let most = lagged.nrows() / n - 1;
+        let variance = lagged.rows(most * n, n).into_owned();
+        let coefficients = || DMatrix::zeros(n, most * n);
         let mut new = Self {
-            ahead: Vec::new(),
-            behind: (!is_reversible).then(Vec::new),
+            lagged,
+            most,
+            order: 0,
+            ahead: coefficients(),
+            behind: coefficients(),
+            is_reversible,
             left: variance.clone(),
-            left_behind: variance.clone(),
+            left_behind: variance,
             factor: None,
             ln_sd: 0.0,
             of_constants: DMatrix::identity(n, n),
+            of_constants_behind: DMatrix::identity(n, n),
             white_constants: DMatrix::zeros(n, n),
+            before: coefficients(),
         };
         new.factorise();
         new
@@ -213,58 +233,75 @@ impl Predictor {
         self.factor.as_ref()
     }
 
+    /// Coefficients of the steps before, the last one first.
+    fn ahead(&self) -> DMatrixView<'_, f64> {
+        self.ahead.columns(0, self.order * self.left.nrows())
+    }
+
     /// One step more.
-    fn extend(&mut self, lagged: &[DMatrix<f64>]) -> Option<()> {
-        let order = self.ahead.len();
-        let mut unexplained = lagged.get(order + 1)?.clone();
-        for (back, ahead) in self.ahead.iter().enumerate() {
-            unexplained.gemm(-1.0, ahead, &lagged[order - back], 1.0);
-        }
+    fn extend(&mut self) -> Option<()> {
+        let (n, order) = (self.left.nrows(), self.order);
+        let known = order * n;
+        let first = self.most.checked_sub(order + 1)? * n;
+        let mut unexplained = self.lagged.rows(first, n).into_owned();
+        unexplained.gemm(-1.0, &self.ahead(), &self.lagged.rows(first + n, known), 1.0);
         // The factor of what is left ahead is at hand.
         let by_ahead = |of: &DMatrix<f64>| {
             let mut solved = self.factor.as_ref()?.solve_lower_triangular(of)?;
             self.factor.as_ref()?.tr_solve_lower_triangular_mut(&mut solved);
             Some(solved)
         };
-        match &mut self.behind {
-            None => {
-                // Behind is as ahead: the new coefficient is the same, too.
-                let new = by_ahead(&unexplained.transpose())?.transpose();
-                self.left.gemm(-1.0, &new, &unexplained.transpose(), 1.0);
-                let constants = self.of_constants.clone();
-                self.of_constants.gemm(-1.0, &new, &constants, 1.0);
-                let before = self.ahead.clone();
-                for (back, ahead) in self.ahead.iter_mut().enumerate() {
-                    ahead.gemm(-1.0, &new, &before[order - 1 - back], 1.0);
-                }
-                self.ahead.push(new);
-            }
-            Some(behind) => {
-                let new_behind = by_ahead(&unexplained)?.transpose();
-                let solved = self.left_behind.clone().cholesky()?.solve(&unexplained.transpose());
-                let new = solved.transpose();
-                self.left.gemm(-1.0, &new, &unexplained.transpose(), 1.0);
-                self.left_behind.gemm(-1.0, &new_behind, &unexplained, 1.0);
-                let before = self.ahead.clone();
-                let n = self.left.nrows();
-                let mut of_behind = DMatrix::identity(n, n);
-                for behind in behind.iter() {
-                    of_behind -= behind;
-                }
-                self.of_constants.gemm(-1.0, &new, &of_behind, 1.0);
-                for (back, ahead) in self.ahead.iter_mut().enumerate() {
-                    ahead.gemm(-1.0, &new, &behind[order - 1 - back], 1.0);
-                }
-                for (back, behind) in behind.iter_mut().enumerate() {
-                    behind.gemm(-1.0, &new_behind, &before[order - 1 - back], 1.0);
-                }
-                self.ahead.push(new);
-                behind.push(new_behind);
-            }
+        let transposed = unexplained.transpose();
+        let new_behind;
+        let new;
+        if self.is_reversible {
+            // Behind is as ahead: the new coefficient is the same, too.
+            new = by_ahead(&transposed)?.transpose();
+            new_behind = new.clone();
+        } else {
+            new_behind = by_ahead(&unexplained)?.transpose();
+            new = self.left_behind.clone().cholesky()?.solve(&transposed).transpose();
+            self.left_behind.gemm(-1.0, &new_behind, &unexplained, 1.0);
         }
+        self.left.gemm(-1.0, &new, &transposed, 1.0);
+        let constants = self.of_constants.clone();
+        self.of_constants.gemm(-1.0, &new, &self.of_constants_behind, 1.0);
+        self.of_constants_behind.gemm(-1.0, &new_behind, &constants, 1.0);
+        let end = self.most * n;
+        let mut before = self.before.columns_mut(0, known);
+        before.copy_from(&self.ahead.columns(0, known));
+        let mut ahead = self.ahead.columns_mut(0, known);
+        let mut behind = self.behind.columns_mut(end - known, known);
+        ahead.gemm(-1.0, &new, &behind, 1.0);
+        if self.is_reversible {
+            for block in 0..order {
+                let same = ahead.columns((order - 1 - block) * n, n);
+                behind.columns_mut(block * n, n).copy_from(&same);
+            }
+        } else {
+            behind.gemm(-1.0, &new_behind, &before, 1.0);
+        }
+        self.ahead.columns_mut(known, n).copy_from(&new);
+        self.behind.columns_mut(end - known - n, n).copy_from(&new_behind);
+        self.order += 1;
         self.factorise();
         self.factor.is_some().then_some(())
     }
+}
+
+/// Ways between places, each once, and which of them it is from each place (column) to each other (row). On a grid most are
+/// there many times.
+fn ways(places_m: &[[f64; 3]]) -> (Vec<[f64; 3]>, DMatrix<usize>) {
+    let mut ways_m: Vec<[f64; 3]> = Vec::new();
+    let n = places_m.len();
+    let way = DMatrix::from_fn(n, n, |row, column| {
+        let way_m = [0, 1, 2].map(|axis| places_m[row][axis] - places_m[column][axis]);
+        ways_m.iter().position(|known| *known == way_m).unwrap_or_else(|| {
+            ways_m.push(way_m);
+            ways_m.len() - 1
+        })
+    });
+    (ways_m, way)
 }
 
 /// Some of the drones, spread over the places, with their neighbours.
@@ -404,7 +441,7 @@ mod tests {
         let rows = Rows::of(&drones, 5, 10);
         let blocks = Blocks::of(&drones, &rows, SIZE).unwrap();
         assert_eq!(blocks.drones, [0, 1, 3, 5], "as long as most of them");
-        assert_eq!(blocks.records.len(), rows.seconds.len());
+        assert_eq!(blocks.steps, rows.seconds.len());
         for (index, drone) in drones.iter_mut().enumerate() {
             let drop = |second: usize| second / 10 % 6 == index;
             drone

@@ -279,21 +279,25 @@ impl Search<'_> {
             }
             self.log_posterior(form, &point)
         };
+        // Both ways along each axis; a pair's mixed difference is that along its diagonal less those along its axes.
+        let along = |shifts: [(usize, f64); 2]| {
+            let back = shifts.map(|(index, shift)| (index, -shift));
+            value(&shifts) + value(&back) - 2.0 * top
+        };
+        let axes: Vec<f64> =
+            (0..SCALES).into_par_iter().map(|axis| along([(axis, 1.0), (axis, 0.0)])).collect();
         let pairs: Vec<(usize, usize)> =
             (0..SCALES).flat_map(|row| (0..=row).map(move |column| (row, column))).collect();
         let seconds: Vec<f64> = pairs
             .par_iter()
             .map(|(row, column)| {
                 let (row, column) = (*row, *column);
-                if row == column {
-                    return (value(&[(row, 1.0)]) + value(&[(row, -1.0)]) - 2.0 * top)
-                        / (STEP * STEP);
-                }
-                let mixed = value(&[(row, 1.0), (column, 1.0)])
-                    + value(&[(row, -1.0), (column, -1.0)])
-                    - value(&[(row, 1.0), (column, -1.0)])
-                    - value(&[(row, -1.0), (column, 1.0)]);
-                mixed / (4.0 * STEP * STEP)
+                let second = if row == column {
+                    axes[row]
+                } else {
+                    0.5 * (along([(row, 1.0), (column, 1.0)]) - axes[row] - axes[column])
+                };
+                second / (STEP * STEP)
             })
             .collect();
         let mut information = SMatrix::<f64, SCALES, SCALES>::zeros();
