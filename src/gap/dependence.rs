@@ -65,7 +65,6 @@ impl Dependence {
 
     /// Whether an effect that depends on a signal may depend on this.
     pub(super) fn is_of(self, signal: Signal) -> bool {
-        let signal = felt_as(signal);
         match self {
             Self::Climb => signal == Signal::Climb,
             Self::ClimbTime => matches!(signal, Signal::Climb | Signal::Time),
@@ -81,6 +80,13 @@ impl Dependence {
             Self::Place => signal == Signal::Neighbours,
             Self::Drone => signal == Signal::Drone,
         }
+    }
+
+    /// Whether an effect may show in this: by a signal of its own or, if it has none, by what the model says of the climb.
+    pub(super) fn may_show(self, effect: &str) -> bool {
+        let signals = signals_of(effect);
+        let has_own = signals.iter().any(|signal| self.is_of(*signal));
+        has_own || matches!(signals, [Signal::ModelIncrement]) && self.is_of(Signal::Climb)
     }
 
     /// Whether it is how the air meets a drone.

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use super::candidates::set;
 use super::contest::PRODUCT_NATS;
 use super::decide::{CONTEST_MARGINS, margin_nats};
-use super::dependence::{Dependence, depend_on_the_same, is_of_air, signals_of};
+use super::dependence::{Dependence, depend_on_the_same, depends_on_climb, is_of_air, signals_of};
 use super::error::GapError;
 use super::explain::Found;
 use super::generic::climb_shapes;
@@ -24,8 +24,8 @@ const UNKNOWN_SHARE: f64 = 0.5;
 /// physics left up to a seventh.
 const SMALL: f64 = 0.2;
 
-/// A free shape that is left must explain so much to be told beside a name of the same kind, nats: less than to be found, since
-/// something is there.
+/// A free shape of the climb that is left must explain so much to be told beside a name of the climb, nats: less than to be
+/// found, since something is there.
 const LEFT_NATS: f64 = 10.0;
 /// And this share of what the name explains. Chosen: other forms of the same physics left up to a seventh.
 const LEFT_SHARE: f64 = 1.0 / 7.0;
@@ -166,7 +166,7 @@ fn beside_something_unknown(steps: &mut [Step]) {
     for (place, step) in steps.iter_mut().enumerate() {
         let Some(effect) = new_name(step) else { continue };
         let near = unknown.iter().find(|(of, depends_on, gain_nats)| {
-            let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
+            let alike = depends_on.may_show(effect);
             *of < place || alike && *gain_nats > UNKNOWN_SHARE * step.gain_nats
         });
         let other = near.map(|(_, depends_on, _)| depends_on.name().to_owned());
@@ -209,13 +209,14 @@ fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
     for step in steps {
         let Some(effect) = new_name(step) else { continue };
-        let looks = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
         // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
-        let meets = depends_on.is_of_air() && is_of_air(effect);
-        let is_left = looks && rest.gain_nats > LEFT_NATS.max(LEFT_SHARE * step.gain_nats)
-            || meets
-                && rest.gain_nats > FREE_FLOOR_NATS.max(rest.threshold_nats)
-                && rest.gain_nats > RIVAL_SHARE * step.gain_nats;
+        let may_be = depends_on.may_show(effect) || depends_on.is_of_air() && is_of_air(effect);
+        let (least_nats, share) = if depends_on.is_of(Signal::Climb) && depends_on_climb(effect) {
+            (LEFT_NATS, LEFT_SHARE)
+        } else {
+            (FREE_FLOOR_NATS.max(rest.threshold_nats), RIVAL_SHARE)
+        };
+        let is_left = may_be && rest.gain_nats > least_nats.max(share * step.gain_nats);
         doubt(step, is_left.then(|| depends_on.name().to_owned()));
     }
 }
@@ -250,7 +251,7 @@ pub(super) fn beside_what_nothing_explains(steps: &mut [Step]) {
 /// nothing of its kind.
 pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>) {
     let Some(Step { finding: Finding::Unknown { depends_on, .. }, .. }) = free else { return };
-    let looks = |name: &str| signals_of(name).iter().any(|signal| depends_on.is_of(*signal));
+    let looks = |name: &str| depends_on.may_show(name);
     for step in steps {
         let Some(effect) = new_name(step).filter(|effect| looks(effect)) else { continue };
         let near = step.gain_nats - CONTEST_MARGINS * margin_nats(step.gain_nats);
