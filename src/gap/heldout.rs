@@ -523,13 +523,42 @@ mod tests {
         assert!((found.before_us.value - 5_f64.sqrt()).abs() < 1e-12, "it is in the gap itself");
     }
 
-    #[test]
-    fn the_floor_is_the_noise_that_is_left_about_a_mean() {
-        // White noise alone: of n bins about their mean, (n - 1) / n of its variance.
+    /// White noise of 2 us alone.
+    fn white() -> Hyper {
         let mut hyper = Hyper(Hyper::default().0.map(|_| f64::ln(1e-6)));
         hyper.0[super::super::noise::SHARED_TIME] = f64::ln(60.0);
         hyper.0[super::super::noise::GUST_TIME] = f64::ln(8.0);
         hyper.0[WHITE] = f64::ln(2.0);
+        hyper
+    }
+
+    #[test]
+    fn what_is_doubted_of_the_air_is_no_gap() {
+        // Twice what a form of the drag is doubted by, as legs into the wind and with it show it.
+        let patterns = trial::patterns();
+        let form: Vec<Vec<f64>> = patterns
+            .iter()
+            .map(|group| (0..group.time_s.len()).map(|bin| [12.0, -12.0][bin % 2]).collect())
+            .collect();
+        let pulses: Pulses = patterns
+            .iter()
+            .zip(&form)
+            .map(|(group, form)| vec![form.iter().map(|us| 2.0 * us).collect(); group.drones])
+            .collect();
+        let left = |doubts: &[Column]| {
+            let air = shared_us(&patterns, &pulses, doubts, &white());
+            let bins = air.iter().zip(&form).flat_map(|(air, form)| air.iter().zip(form));
+            bins.map(|(air, form)| (2.0 * form - air).abs()).fold(0.0, f64::max)
+        };
+        assert!(left(&[]) > 20.0, "{}", left(&[]));
+        let known = left(&[Column::Shared(form.clone())]);
+        assert!(known < 2.0, "{known}");
+    }
+
+    #[test]
+    fn the_floor_is_the_noise_that_is_left_about_a_mean() {
+        // Of n bins about their mean, (n - 1) / n of the variance.
+        let hyper = white();
         let patterns = trial::patterns();
         let found = floor(&patterns, &[], &[2, 1], &hyper, 1);
         assert!((found - 2.0 * (5.0_f64 / 6.0).sqrt()).abs() < 0.15, "{found}");
