@@ -1,4 +1,4 @@
-//! What was computed before. Searches of one flight begin alike: with the same logs, the same model and the same updrafts,
+//! Results that were computed before. Searches of one flight begin alike: with the same logs, the same model and the same updrafts,
 //! each looks for something else, and the best of them is taken up once more. What follows from the same numbers, bit by
 //! bit, is computed once.
 
