@@ -306,19 +306,31 @@ impl<'a> Problem<'a> {
     fn digest(&self) -> Digest {
         let mut digest = Digest::new();
         digest.add(self.groups.len() as u64);
+        // All fields by name: a new one must be taken in, too.
         for group in self.groups {
-            digest.add(group.drones as u64);
-            let GroupPattern { time_s, height_m, shift_mps, bent_us, slope_us, .. } = group;
+            let GroupPattern {
+                drones,
+                time_s,
+                height_m,
+                response,
+                shift_mps,
+                bent_us,
+                side_response,
+                slope_us,
+            } = group;
+            digest.add(*drones as u64);
             for values in [time_s, height_m, shift_mps, bent_us, slope_us] {
                 digest.add_all(values);
             }
-            digest.add_all(group.response.iter().flat_map(Response::values));
-            digest.add_all(group.side_response.iter().flatten());
+            digest.add_all(response.iter().flat_map(Response::values));
+            digest.add_all(side_response.iter().flatten());
         }
         for split in [self.pulses].into_iter().chain(&self.columns) {
-            digest.add(u64::from(split.is_doubt));
-            split.means.iter().for_each(|means| digest.add_all(means));
-            split.deviations.iter().flatten().for_each(|drone| digest.add_all(drone));
+            let Split { means, deviations, is_doubt } = split;
+            digest.add(u64::from(*is_doubt));
+            for values in means.iter().chain(deviations.iter().flatten()) {
+                digest.add_all(values);
+            }
         }
         digest
     }

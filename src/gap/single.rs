@@ -230,10 +230,11 @@ fn beside_drag_of_the_body(found: &mut Found) {
     if is_told || x_mps.hypot(y_mps) < LEAST_WIND_MPS {
         return;
     }
+    let bodies = || [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter_map(Role::place);
     for step in &mut found.steps {
-        let is_drag = new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect));
-        let bodies = [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter_map(Role::place);
-        doubt(step, bodies.map(|place| place.name().to_owned()).filter(|_| is_drag));
+        if new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect)) {
+            doubt(step, bodies().map(|place| place.name().to_owned()));
+        }
     }
 }
 
