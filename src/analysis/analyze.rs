@@ -37,7 +37,7 @@ use super::result::{
 use super::site::FlightSite;
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
-use super::statistics::result::FieldStatistics;
+use super::statistics::result::{FieldStatistics, TiltWind};
 use super::table::{self, PaperTable, TableLaw};
 use super::track;
 use super::truth;
@@ -354,16 +354,18 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
         Beside::add(map, seen.iter().map(|seen| &seen.beside));
     }
     let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
-    if let Some((map, modelled)) = map.as_mut().zip(modelled).filter(|_| options.posterior) {
-        posterior::add(
-            map,
-            modelled,
-            shared,
-            statistics.as_ref().and_then(|found| found.wind.as_ref()),
-        );
-    }
-    let turbulence =
-        map.as_ref().and_then(|map| turbulence_of(shared, (map, &seen), statistics.as_ref()));
+    let places = map.as_ref().map(Places::of);
+    let wind = statistics.as_ref().and_then(|found| found.wind.as_ref());
+    // Neither needs the other's result, and both take seconds where many drones hover for long.
+    let ((), turbulence) = rayon::join(
+        || {
+            if let Some((map, modelled)) = map.as_mut().zip(modelled).filter(|_| options.posterior)
+            {
+                posterior::add(map, modelled, shared, wind);
+            }
+        },
+        || places.and_then(|places| turbulence_of(shared, (&places, &seen), wind)),
+    );
     let wind_legs = input.plan.and_then(|plan| WindLegs::of(plan, &drones));
     FlightAnalysis {
         name: input.name.to_owned(),
@@ -559,24 +561,42 @@ fn statistics(
     })
 }
 
+/// Drones of a map with their places.
+struct Places {
+    /// Slot, name, and place in the show frame, m.
+    drones: Vec<(Option<u16>, String, Option<[f64; 2]>)>,
+    /// Their mean height, m.
+    height_m: Option<f64>,
+}
+
+impl Places {
+    fn of(map: &UpdraftMap) -> Self {
+        let each = map.drones.iter();
+        Self {
+            drones: each.map(|drone| (drone.slot, drone.name.clone(), drone.position_m)).collect(),
+            height_m: mean(map.drones.iter().map(|drone| drone.height_m)),
+        }
+    }
+}
+
 /// Turbulence over a map's hover; `None` where drones moved.
 fn turbulence_of(
     shared: &Shared<'_>,
-    (map, seen): (&UpdraftMap, &[HoverSeen]),
-    statistics: Option<&FieldStatistics>,
+    (places, seen): (&Places, &[HoverSeen]),
+    wind: Option<&TiltWind>,
 ) -> Option<Turbulence> {
-    let known = map.drones.iter().zip(seen);
+    let known = places.drones.iter().zip(seen);
     let drones: Vec<turbulence::Drone<'_>> = known
-        .filter_map(|(drone, seen)| {
-            let (slot, name, place_m) = (drone.slot, drone.name.as_str(), drone.position_m);
+        .filter_map(|((slot, name, place_m), seen)| {
+            let (slot, name, place_m) = (*slot, name.as_str(), *place_m);
             Some(turbulence::Drone { slot, name, place_m, records: seen.records.as_ref()? })
         })
         .collect();
     let asked = turbulence::Asked {
         orientation_deg: shared.input.plan.map(|plan| plan.site.orientation_deg),
-        wind: statistics.and_then(|found| found.wind.as_ref()),
+        wind,
         drag_share: shared.drag().share(),
-        height_m: mean(map.drones.iter().map(|drone| drone.height_m)),
+        height_m: places.height_m,
         mixed_layer_depth_m: shared.options.mixed_layer_depth_m,
     };
     turbulence::of_fleet(&drones, asked)

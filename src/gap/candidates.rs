@@ -5,12 +5,13 @@ use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use super::compare::Comparison;
+use super::data::Load;
 use super::decide::CLASS_NATS;
 use super::gls::{Column, Solution};
 use super::lean::GRAVITY;
 use super::noise::{GroupPattern, Hyper};
 use super::response::{self, Response};
-use super::scene::Scene;
+use super::scene::{Scene, hover_a};
 use crate::effects::{Definition, EffectError, LIBRARY, Role, Sought, find, select};
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
@@ -396,9 +397,6 @@ fn prepare(vehicle: &mut Vehicle, definition: &Definition, scene: &Scene) {
     if is_battery && is_new && scene.resting_v > 0.0 {
         Role::BatteryCells.set(vehicle, scene.cells);
         Role::BatteryCharge.set(vehicle, 1.0);
-        if let Some(resistance_ohm) = scene.resistance_ohm {
-            Role::BatteryResistance.set(vehicle, resistance_ohm.clamp(0.0, 1.0));
-        }
         // The model's hover is stated for its own nominal voltage, unless its battery is another.
         if Role::BatteryReference
             .value(vehicle)
@@ -406,8 +404,17 @@ fn prepare(vehicle: &mut Vehicle, definition: &Definition, scene: &Scene) {
         {
             Role::BatteryReference.set(vehicle, scene.cells * NOMINAL_V);
         }
+        if let Some(Load { resistance_ohm, flown_a }) = scene.load {
+            // The voltage falls by what was flown with, whatever current the model's hover takes.
+            let more = flown_a.zip(hover_a(vehicle)).map_or(1.0, |(flown, model)| flown / model);
+            let more = more.clamp(1.0 / MOST_OTHER_CURRENT, MOST_OTHER_CURRENT);
+            Role::BatteryResistance.set(vehicle, (resistance_ohm * more).clamp(0.0, 1.0));
+        }
     }
 }
+
+/// A current that differs more from the model's is not believed: an uncalibrated sensor. Chosen.
+const MOST_OTHER_CURRENT: f64 = 4.0;
 
 /// Sets a parameter of an effect and switches it on.
 pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
@@ -586,5 +593,27 @@ mod tests {
         let share = |bin: usize| drift.column.at(0, 0, bin) / responses[bin];
         assert!((share(last) + 1.0).abs() < 1e-9, "1 m/s at the end: {}", share(last));
         assert!((-0.1..0.0).contains(&share(first)), "and hardly any before: {}", share(first));
+    }
+
+    /// The model's current is that of its own motors, and the drones' may be another: the product of resistance and current
+    /// is what the voltage falls by.
+    #[test]
+    fn a_battery_that_is_tried_falls_by_what_was_flown_with() {
+        let battery = find("battery").unwrap().definition();
+        let resistance_ohm = |flown_a: Option<f64>| {
+            let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+            let scene = &mut comparison.scene;
+            (scene.cells, scene.resting_v) = (3.0, 11.5);
+            scene.load = Some(Load { resistance_ohm: 0.03, flown_a });
+            let mut vehicle = trial::vehicle();
+            prepare(&mut vehicle, battery, scene);
+            (hover_a(&vehicle).unwrap(), Role::BatteryResistance.value(&vehicle).unwrap())
+        };
+        let (model_a, alone_ohm) = resistance_ohm(None);
+        assert!((alone_ohm - 0.03).abs() < 1e-12, "{alone_ohm}");
+        let (_, ohm) = resistance_ohm(Some(1.5 * model_a));
+        assert!((ohm - 0.045).abs() < 1e-9, "{ohm}");
+        let (_, ohm) = resistance_ohm(Some(100.0 * model_a));
+        assert!((ohm - 0.12).abs() < 1e-9, "a sensor that is not calibrated: {ohm}");
     }
 }

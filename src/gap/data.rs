@@ -94,8 +94,17 @@ pub struct Data {
     pub groups: Vec<Group>,
     /// Drones left out, with their reasons.
     pub left_out: Vec<LeftOut>,
-    /// Resistance of the batteries as the autopilots found it (median), ohm.
-    pub resistance_ohm: Option<f64>,
+    /// The batteries under load, if the logs have it.
+    pub load: Option<Load>,
+}
+
+/// Batteries under load: medians over the logs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// Resistance as the autopilots found it, ohm.
+    pub resistance_ohm: f64,
+    /// Current in flight, A, if it was logged.
+    pub flown_a: Option<f64>,
 }
 
 impl Data {
@@ -127,7 +136,7 @@ impl Data {
             let armed_s = first_armed_s(drones.iter().map(|(_, flight)| *flight));
             data.add(&group.name, &bins, values, armed_s);
         }
-        data.resistance_ohm = resistance_ohm(flown);
+        data.load = load(flown);
         let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
         data.count_neighbours(&plan.slots, spacing_m);
         data
@@ -158,7 +167,7 @@ impl Data {
             .collect();
         let armed_s = first_armed_s(flown.iter().map(|one| one.flight));
         data.add("all", &bins, values, armed_s);
-        data.resistance_ohm = resistance_ohm(flown);
+        data.load = load(flown);
         data
     }
 
@@ -317,7 +326,7 @@ impl Data {
                 .map(|group| group.only(|index| is_held(index) == held))
                 .collect(),
             left_out: self.left_out.clone(),
-            resistance_ohm: self.resistance_ohm,
+            load: self.load,
         };
         (part(false), part(true))
     }
@@ -365,11 +374,17 @@ pub(super) fn constant_us<'a>(
     (count > 2 && high - low < CONSTANT_US).then_some(low)
 }
 
-/// The middle one of the resistances that the logs have.
-fn resistance_ohm(flown: &[Flown<'_>]) -> Option<f64> {
-    let mut known: Vec<f64> = flown.iter().filter_map(|one| one.flight.resistance_ohm).collect();
+/// What the logs have of their batteries under load.
+fn load(flown: &[Flown<'_>]) -> Option<Load> {
+    let flights = || flown.iter().map(|one| one.flight);
+    let mut known: Vec<f64> = flights().filter_map(|flight| flight.resistance_ohm).collect();
     known.retain(|ohm| *ohm > 0.0 && *ohm < 1.0);
-    upper_median(known)
+    let amps = |flight: &Flight| {
+        let (start_s, end_s) = *flight.armed_s.first()?;
+        upper_median(flight.current_a.as_ref()?.between(start_s, end_s).to_vec())
+    };
+    let flown_a = upper_median(flights().filter_map(amps).filter(|amps| *amps > 0.0).collect());
+    Some(Load { resistance_ohm: upper_median(known)?, flown_a })
 }
 
 /// When the first of the drones armed, show time, s; infinity if none did.

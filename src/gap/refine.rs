@@ -178,7 +178,9 @@ pub(super) fn doubts(
     doubts.extend(comparison.spread_doubts(vehicle)?);
     doubts.extend(form_doubts(&comparison.scene));
     for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
-        let Some((form, sd)) = form_of(fitted) else { continue };
+        let Some((form, sd)) = form_of(fitted).or_else(|| load_of(fitted, vehicle)) else {
+            continue;
+        };
         let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);
         if parameters.iter().any(is_fitted) {
             continue;
@@ -204,6 +206,23 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
     }
     let (low, high) = extent(*values)?;
     Some((form, (high - low) / 2.0))
+}
+
+/// How much a battery's voltage falls under load may be wrong by this share: a resistance that the autopilot estimates, and
+/// a current that goes with another power of the thrust than the model's. It steepens the response, as a larger exponent
+/// does. Chosen.
+const LOAD_DOUBT: f64 = 0.5;
+
+/// The fall of the voltage under load, by the resistance, where the sag is fitted.
+fn load_of(size: &Parameter, vehicle: &Vehicle) -> Option<(Parameter, f64)> {
+    let definition = find(size.effect)?.definition();
+    let sag = definition.with_role(Role::BatterySag)?;
+    if sag.name != size.name {
+        return None;
+    }
+    let resistance = definition.with_role(Role::BatteryResistance)?.name;
+    let ohm = Role::BatteryResistance.value(vehicle)?;
+    Some((parameter(definition, resistance)?, LOAD_DOUBT * ohm))
 }
 
 /// Whether a form is one of two, of which the search chooses: the size is that of the chosen one.

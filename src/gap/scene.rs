@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
-use super::data::Data;
+use super::data::{Data, Load};
 use super::gls::{Column, Pulses};
 use super::lean::Wind;
 use super::response::Response;
@@ -40,8 +40,8 @@ pub struct Scene {
     pub cells: f64,
     /// Mean voltage at rest, V; 0 if it was not logged.
     pub resting_v: f64,
-    /// Resistance of the batteries as the logs have it, ohm.
-    pub resistance_ohm: Option<f64>,
+    /// The batteries under load as the logs have them.
+    pub load: Option<Load>,
     neighbours: Vec<Vec<f64>>,
     /// What the logs of another program's simulation have more than the model that stands for it.
     as_flown: Option<AsFlown>,
@@ -85,7 +85,7 @@ impl Scene {
         let resting_v =
             mean(each().map(|values| values.resting_v)).filter(|_| logged).unwrap_or_default();
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
-        let resistance_ohm = data.resistance_ohm;
+        let load = data.load;
         let relative_mps = wind.air_mps.clone();
         let updraft_mps = 0.0;
         Self {
@@ -95,7 +95,7 @@ impl Scene {
             volts,
             cells,
             resting_v,
-            resistance_ohm,
+            load,
             neighbours,
             as_flown: None,
         }
@@ -355,10 +355,15 @@ fn shakes(effect: &str) -> bool {
 
 /// Charge that a hover takes out of a vehicle's battery, Ah/s; `None`: it has no battery.
 fn hover_ah_per_s(vehicle: &Vehicle) -> Option<f64> {
+    Some(hover_a(vehicle)? / 3600.0)
+}
+
+/// Current of a vehicle's hover, A; `None`: it has no battery.
+pub(super) fn hover_a(vehicle: &Vehicle) -> Option<f64> {
     Role::BatteryCharge.value(vehicle)?;
     let of = |role: Role| role.value(vehicle).unwrap_or_default();
     let power_w = Reference::of(vehicle).hover_w() + of(Role::BatteryAvionics);
-    Some(power_w / of(Role::BatteryReference).max(0.1) / 3600.0)
+    Some(power_w / of(Role::BatteryReference).max(0.1))
 }
 
 /// A battery's voltage at rest in each bin without the scatter of the bins, V: by a cubic of time. What a logger
