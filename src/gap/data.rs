@@ -379,8 +379,11 @@ fn load(flown: &[Flown<'_>]) -> Option<Load> {
     let flights = || flown.iter().map(|one| one.flight);
     let mut known: Vec<f64> = flights().filter_map(|flight| flight.resistance_ohm).collect();
     known.retain(|ohm| *ohm > 0.0 && *ohm < 1.0);
+    // Who armed and gave up before the flight idled then.
     let amps = |flight: &Flight| {
-        let (start_s, end_s) = *flight.armed_s.first()?;
+        let length_s = |(start_s, end_s): &(f64, f64)| end_s - start_s;
+        let longest = flight.armed_s.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
+        let (start_s, end_s) = *longest?;
         upper_median(flight.current_a.as_ref()?.between(start_s, end_s).to_vec())
     };
     let flown_a = upper_median(flights().filter_map(amps).filter(|amps| *amps > 0.0).collect());

@@ -373,3 +373,27 @@ pub(super) fn fitted(
     };
     parameters.iter().zip(values).map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+
+    #[test]
+    fn a_sag_that_is_fitted_doubts_what_the_voltage_falls_by_under_load() {
+        let comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let mut vehicle = trial::vehicle();
+        set(&mut vehicle, "battery", "exponent", 0.8);
+        let sag = parameter(find("battery").unwrap().definition(), "exponent").unwrap();
+        let without = doubts(&comparison, &vehicle, &[]).unwrap().len();
+        let fitted = doubts(&comparison, &vehicle, &[sag]).unwrap();
+        assert_eq!(fitted.len(), without + 1);
+        // Half of 0.05 ohm steepens the response: who climbs takes more current than who descends.
+        let bins = &comparison.data.groups[0].bins;
+        let at = |climb_mps: f64| {
+            let bin = bins.iter().position(|bin| bin.climb_mps() == climb_mps).unwrap();
+            fitted[without].at(0, 0, bin)
+        };
+        assert!(at(2.0) > at(-2.0) && at(-2.0) > 0.0, "{} and {}", at(2.0), at(-2.0));
+    }
+}

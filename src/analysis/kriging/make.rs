@@ -27,7 +27,7 @@ const NORMAL: f64 = 1.96;
 const FEWEST: usize = 24;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
 /// Over level ground there is none in the long run; slopes and waves have one. Chosen: with 0.2 this possibility alone made
-/// the error of a field's zero a fifth larger.
+/// the stated error of a field with known scales and gusts a fifth larger (docs/errors.md).
 const UNIFORM_SHARE: f64 = 0.05;
 /// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
 /// leaves, before its scales are known.
