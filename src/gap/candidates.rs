@@ -264,16 +264,23 @@ fn of_library(
             }
             _ => vec![None],
         };
+        let is_body = parameter.role == Some(Role::BodyDragTop) && now == 0.0;
+        let sides = if is_body { sides_tried(vehicle, comparison) } else { vec![None] };
         let mut variants = Vec::new();
         for value in sizes {
-            for shape in &shapes {
+            for (shape, sides) in
+                shapes.iter().flat_map(|one| sides.iter().map(move |sides| (one, *sides)))
+            {
                 let mut other = vehicle.clone();
                 prepare(&mut other, definition, &comparison.scene);
                 set(&mut other, definition.name, size, value);
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
                 }
-                let form = shape.map(|(_, value)| value);
+                if let Some(sides) = sides {
+                    Role::BodyDragSide.set(&mut other, sides * value);
+                }
+                let form = sides.or(shape.map(|(_, value)| value));
                 let is_unusual =
                     shape.is_some_and(|(name, value)| is_unusual(definition, vehicle, name, value));
                 let price_nats = if is_unusual { CLASS_NATS } else { 0.0 };
@@ -437,6 +444,24 @@ fn sides_of(vehicle: &Vehicle) -> f64 {
     let sides = (factor.x * factor.y).sqrt();
     if factor.z > 0.0 && sides > 0.0 { sides / factor.z } else { USUAL_SIDES }
 }
+
+/// Drag areas of a new body's sides over that of its top that are tried; `None`: as [`set`] chooses it. In wind the leans
+/// tell a flat body, as the airframe is, from a round one, which resists alike from all sides.
+fn sides_tried(vehicle: &Vehicle, comparison: &Comparison) -> Vec<Option<f64>> {
+    let [x_mps, y_mps] = comparison.wind.mean_mps;
+    let flat = sides_of(vehicle);
+    if x_mps.hypot(y_mps) < LEAST_WIND_MPS || (flat / ROUND).ln().abs() < SAME_SIDES {
+        return vec![None];
+    }
+    vec![Some(flat), Some(ROUND)]
+}
+
+/// Horizontal over vertical area of a round body.
+const ROUND: f64 = 1.0;
+/// Logarithm of the ratio of two shapes of a body that are as good as the same. Chosen.
+const SAME_SIDES: f64 = 0.3;
+/// Wind below which leans do not tell the shape of a body, m/s. Chosen: gusts of a calm day.
+const LEAST_WIND_MPS: f64 = 1.0;
 
 /// Horizontal over vertical area of a body's drag where the airframe states none. Chosen; the
 /// `parasitic-drag` of the library has the same ratio by default.

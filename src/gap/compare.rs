@@ -9,7 +9,8 @@ use super::data::{Data, Group};
 use super::error::GapError;
 use super::generic::climb_shapes;
 use super::gls::{Column, Pulses};
-use super::lean::{LeanLaw, Wind, mean_wind, wind, wind_by};
+use super::lean::{self, LeanLaw, Wind, mean_wind, wind, wind_by};
+use super::lean_fit::Body;
 use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
@@ -439,6 +440,19 @@ impl Comparison {
         }
         let law = lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
         (!law.reads_as(self.read_by)).then_some(law)
+    }
+
+    /// A round body that the model lacks, by the leans of horizontal legs, and by how much its drag area (m²) leans the
+    /// vehicle, rad/(m/s)²; `None`: there are no legs.
+    pub(super) fn body_told(&self) -> Option<(Body, f64)> {
+        let told = lean::body(&self.data, self.read_by, (&self.side, self.flown_mps))?;
+        let mut larger = self.vehicle.clone();
+        let sides_m2 = Role::BodyDragSide.value(&larger).unwrap_or_default();
+        Role::BodyDragSide.set(&mut larger, sides_m2 + 1.0);
+        let updraft_mps = self.read_by.updraft_mps;
+        let [without, with] =
+            [&self.vehicle, &larger].map(|one| lean_law(one, self.amsl_m, updraft_mps).square);
+        Some((told, with - without))
     }
 
     fn wind_by(&self, law: LeanLaw) -> Wind {

@@ -44,6 +44,10 @@ pub(super) const PRODUCT: Dependence = Dependence::ClimbTime;
 /// taken for drag; 6 since the scatter between drones takes part. The values are chosen.
 const SIMPLE: [(Dependence, f64); 2] = [(PRODUCT, 6.0), (Dependence::Step, 2.5)];
 
+/// An effect that is held against what was found must gain so much, nats: half of what finds it, since what is as good as the
+/// least of findings may gain less than its threshold. Chosen.
+const HELD_NATS: f64 = 0.5 * FLOOR_NATS;
+
 /// An effect this near to a size that matters is named before a free shape that looks like it. Chosen.
 const NEARLY: f64 = 0.6;
 
@@ -91,7 +95,8 @@ pub(super) fn decide(
     options: &Options,
     step: usize,
 ) -> Decision {
-    let floor = FLOOR_NATS;
+    // Who is held against others alone is flown whatever it explains: how well it does is compared then.
+    let floor = if options.only.is_some() { HELD_NATS } else { FLOOR_NATS };
     let mut limits = Thresholds { library: floor, generic: FREE_FLOOR_NATS };
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
     // What has so much freedom must show in the means, whatever it does to the scatter.
@@ -113,9 +118,7 @@ pub(super) fn decide(
             || (ranked.size_us >= NEARLY * material_us
                 && free.is_some_and(|free| free.gain > FLOOR_NATS && ranked.gain > free.gain))
             // What is short, or plain in calm air, matters by what it does where it is largest.
-            || (ranked.range_us >= material_us
-                && ranked.gain > FREE_FLOOR_NATS
-                && matches!(form(sought, ranked), Column::Shared(_)));
+            || ranked.gain > FREE_FLOOR_NATS && range_us(sought, ranked) >= material_us;
         let candidate = &sought.library[ranked.candidate];
         // That the shared air drifted is what it does: a rival, never a finding. That it grew with
         // height is no lack of the vehicle: it must say as much as a free shape.
@@ -123,7 +126,7 @@ pub(super) fn decide(
         let is_plain = candidate.size.is_some() && !candidate.by_lean;
         let is_effect = is_plain || ranked.gain > FREE_FLOOR_NATS;
         // Scatter between drones has many causes: it may support a name, never make one.
-        let in_means = ranked.plain > FLOOR_NATS;
+        let in_means = ranked.plain > floor;
         candidate.name != "updraft-drift" && is_effect && in_means && ranked.fitted && matters
     };
     let best = round.library.iter().find(is_named);
@@ -192,6 +195,16 @@ const SURE_NATS: f64 = 40.0;
 /// What an effect in its best form adds to the pulse.
 pub(super) fn form<'a>(sought: Sought<'a>, ranked: &Ranked) -> &'a Column {
     &sought.library[ranked.candidate].variants[ranked.variant].column
+}
+
+/// Largest minus smallest of what a candidate does to the fleet's mean pulse, us; none where only the scatter between drones
+/// is plain.
+fn range_us(sought: Sought<'_>, ranked: &Ranked) -> f64 {
+    match form(sought, ranked) {
+        Column::Shared(_) => ranked.range_us,
+        Column::Own(_) if ranked.plain < FREE_FLOOR_NATS => 0.0,
+        own @ Column::Own(_) => ranked.beta.abs() * Column::Shared(own.means()).range(),
+    }
 }
 
 /// What a free shape still gains with an effect in the model, nats.

@@ -5,8 +5,10 @@ use super::data::Data;
 use super::error::GapError;
 use super::gls::Column;
 use super::make::Input;
-use super::refine::{Parameter, size_errors, size_of};
-use crate::effects::Signals;
+use super::refine::{Parameter, size_of, slopes, trace_errors};
+use crate::effects::select::{set, value_of};
+use crate::effects::{EffectError, Signals};
+use crate::vehicle::Vehicle;
 
 /// Pulse of steady flight by its signals and by the direction of the air from the nose, rad, us.
 pub type SteadyPulse<'a> = Box<dyn Fn(&Signals, f64) -> f64 + 'a>;
@@ -43,35 +45,47 @@ pub fn fisher_z(
     let simulated = Simulated::Refly(plan);
     let comparison =
         Comparison::of(&data, input.vehicle, &simulated, input.plan, updraft_mps, None)?;
+    let vehicle = &comparison.vehicle;
     let parameter = |one: &There<'_>| match one {
         There::Effect { effect, size, .. } => size_of(effect, size),
         There::Pulse(_) => None,
     };
-    let parameters: Vec<Option<Parameter>> = there.iter().map(parameter).collect();
-    let known: Vec<Parameter> = parameters.iter().flatten().cloned().collect();
-    let pulses: Vec<Column> = there
-        .iter()
-        .filter_map(|one| match one {
-            There::Effect { .. } => None,
-            There::Pulse(pulse_us) => Some(column(&comparison, pulse_us)),
-        })
-        .collect();
-    let vehicle = comparison.vehicle.clone();
-    let (of_sizes, of_pulses) = size_errors(&comparison, &vehicle, &known, &pulses)?;
-    let (mut of_sizes, mut of_pulses) = (of_sizes.into_iter(), of_pulses.into_iter());
-    Ok(there
-        .iter()
-        .zip(&parameters)
-        .map(|(one, parameter)| {
-            let (change, se) = match one {
-                There::Effect { change, .. } => {
-                    (*change, parameter.as_ref().and_then(|_| of_sizes.next())?)
-                }
-                There::Pulse(_) => (1.0, of_pulses.next()?),
-            };
-            (se > 0.0).then(|| (change / se).abs()).filter(|z| z.is_finite())
-        })
-        .collect())
+    let known: Vec<Parameter> = there.iter().filter_map(parameter).collect();
+    let column = |one: &There<'_>| match one {
+        There::Effect { change, .. } => {
+            parameter(one).map(|size| of_effect(&comparison, vehicle, &size, *change)).transpose()
+        }
+        There::Pulse(pulse_us) => Ok(Some(column(&comparison, pulse_us))),
+    };
+    let columns = there.iter().map(column).collect::<Result<Vec<Option<Column>>, GapError>>()?;
+    let traces: Vec<Column> = columns.iter().flatten().cloned().collect();
+    let mut errors = trace_errors(&comparison, vehicle, &known, &traces)?.into_iter();
+    let z = |column: &Option<Column>| {
+        let se = column.as_ref().and_then(|_| errors.next())?;
+        (se > 0.0).then(|| 1.0 / se).filter(|z| z.is_finite())
+    };
+    Ok(columns.iter().map(z).collect())
+}
+
+/// All that an effect does to the pulse, from the size it would have without `change`: not its derivative, which for what goes
+/// with the square of its size is twice as much.
+fn of_effect(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    size: &Parameter,
+    change: f64,
+) -> Result<Column, GapError> {
+    let now = value_of(vehicle, size.effect, size.name).unwrap_or(change);
+    let mut without = vehicle.clone();
+    set(&mut without, size.effect, size.name, now - change);
+    match comparison.change(&without, vehicle) {
+        Err(EffectError::NotFlown { .. }) => {
+            let slopes = slopes(comparison, vehicle, std::slice::from_ref(size))?;
+            let slope = slopes.first().ok_or(GapError::NothingCommon)?;
+            Ok(slope.each(|group, drone, bin| change * slope.at(group, drone, bin)))
+        }
+        column => Ok(column?),
+    }
 }
 
 fn column(comparison: &Comparison, pulse_us: &SteadyPulse<'_>) -> Column {

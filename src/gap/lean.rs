@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::filter::{Filter, LooksAt, Observation, State};
-use super::lean_fit::{Fitted, Point, fit, hovering_wind};
+use super::lean_fit::{Body, Fitted, Point, fit, fit_body, hovering_wind};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
 use crate::numeric::Moments;
@@ -152,6 +152,17 @@ impl LeanLaw {
 
     fn body_square(self) -> f64 {
         self.square * self.body_share
+    }
+
+    /// The same with another quadratic part, rad/(m/s)².
+    pub(super) fn with_square(self, square: f64) -> Self {
+        Self { square, ..self }
+    }
+
+    /// The same with the drag of a round body besides, rad/(m/s)².
+    pub(super) fn with_body(self, more: f64) -> Self {
+        let square = (self.square + more).max(1e-9);
+        Self { square, body_share: (self.body_square() + more) / square, ..self }
     }
 
     /// The lean in horizontal air, show frame.
@@ -364,6 +375,31 @@ fn settled_leans(
         .collect()
 }
 
+/// The mean lean of each group in each bin.
+fn points(data: &Data, leans: &[Vec<[f64; 2]>]) -> Vec<Point> {
+    let of_group = |(group, leans): (&Group, &Vec<[f64; 2]>)| -> Vec<Point> {
+        let height_m = |bin: usize| group.mean(bin, |values| values.height_m);
+        let each = group.bins.iter().zip(leans).enumerate();
+        each.map(|(place, (bin, lean))| Point::of(bin, height_m(place), *lean)).collect()
+    };
+    data.groups.iter().zip(leans).flat_map(of_group).collect()
+}
+
+/// Whether there are legs enough to fit a law to.
+fn moves(points: &[Point]) -> bool {
+    points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING
+}
+
+/// A round body that the model lacks, by legs; `None`: there are none. `flown` is as in [`wind`].
+pub(super) fn body(
+    data: &Data,
+    law: LeanLaw,
+    flown: (&[Vec<BinValues>], [f64; 3]),
+) -> Option<Body> {
+    let points = points(data, &settled_leans(data, law, Some(flown)));
+    moves(&points).then(|| fit_body(points, law))
+}
+
 /// The mean of the wind with the law of the lean that it was read by.
 struct MeanWind {
     mean_mps: [f64; 2],
@@ -374,14 +410,8 @@ struct MeanWind {
 
 impl MeanWind {
     fn of(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw, is_flown: bool) -> Self {
-        let of_group = |(group, leans): (&Group, &Vec<[f64; 2]>)| -> Vec<Point> {
-            let height_m = |bin: usize| group.mean(bin, |values| values.height_m);
-            let each = group.bins.iter().zip(leans).enumerate();
-            each.map(|(place, (bin, lean))| Point::of(bin, height_m(place), *lean)).collect()
-        };
-        let points: Vec<Point> = data.groups.iter().zip(leans).flat_map(of_group).collect();
-        let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
-        if moves && is_flown {
+        let points = points(data, leans);
+        if moves(&points) && is_flown {
             let legs = fit(points, law);
             return Self { mean_mps: legs.mean_mps, law: legs.law, legs: Some(legs) };
         }

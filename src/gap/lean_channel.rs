@@ -2,7 +2,9 @@
 //! rotors' drag, whatever the pulse tells.
 
 use super::compare::Comparison;
+use super::decide::CLASS_NATS;
 use super::lean::LeanLaw;
+use super::lean_fit::Body;
 use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
@@ -62,7 +64,7 @@ pub(super) fn alike() -> Vec<String> {
     both.iter().filter_map(|role| Some(role.place()?.name().to_owned())).collect()
 }
 
-/// Drag of the rotors that the model lacks, or has with another size: a class, because leans do not tell its kind.
+/// Drag that the model lacks, or has with another size: a class, because leans do not tell its kind.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     let apart = apart(measured.law, wind.model_lean_per_mps);
@@ -70,16 +72,26 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
     if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
         return None;
     }
-    let place = Role::RotorDrag.place()?;
-    let known = Role::RotorDrag.value(&before.vehicle);
-    let fitted = Fitted {
-        name: place.parameter.name.to_owned(),
-        unit: place.parameter.unit.to_owned(),
-        value: wind.lean_per_mps?,
-        before: known,
+    // Whose drag it is the speeds tell: that of rotors is linear, that of a body goes with the square.
+    let body = before.body_told();
+    let nats = body.map_or(f64::NEG_INFINITY, |(body, _)| body.better_nats);
+    let (effects, parameters) = match body {
+        Some(told) if nats > CLASS_NATS => (bodies(), of_body(told)?),
+        _ => {
+            let mut effects = alike();
+            effects.extend(bodies().into_iter().take(usize::from(nats > -CLASS_NATS)));
+            let place = Role::RotorDrag.place()?;
+            let fitted = Fitted {
+                name: place.parameter.name.to_owned(),
+                unit: place.parameter.unit.to_owned(),
+                value: wind.lean_per_mps?,
+                before: Role::RotorDrag.value(&before.vehicle),
+            };
+            (effects, vec![fitted])
+        }
     };
     Some(Step {
-        finding: Finding::Class { effects: alike(), parameters: vec![fitted] },
+        finding: Finding::Class { effects, parameters },
         gain_nats: 0.5 * z * z,
         threshold_nats: 0.5 * NAMED_Z * NAMED_Z,
         alpha,
@@ -88,6 +100,34 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         shape: None,
         in_field: None,
     })
+}
+
+/// Effects that lean a drone with the square of the air speed: a body besides that of the model, and another drag of its own
+/// faces. The first is what the model gets.
+fn bodies() -> Vec<String> {
+    let both = [Role::BodyDragSide, Role::FaceDragSide];
+    both.iter().filter_map(|role| Some(role.place()?.name().to_owned())).collect()
+}
+
+/// The drag areas of a round body, m², of which that much leans the vehicle by so much, rad/(m/s)².
+fn of_body((body, per_m2): (Body, f64)) -> Option<Vec<Fitted>> {
+    let half = HALF * body.square_se;
+    let area = |square: f64| (square / per_m2).max(0.0);
+    let one = |role: Role| {
+        let parameter = role.place()?.parameter;
+        Some(Fitted {
+            name: parameter.name.to_owned(),
+            unit: parameter.unit.to_owned(),
+            value: Interval {
+                value: area(body.square),
+                low: area(body.square - half),
+                high: area(body.square + half),
+            },
+            before: None,
+        })
+    };
+    (per_m2 > 0.0 && half.is_finite()).then_some(())?;
+    [Role::BodyDragTop, Role::BodyDragSide].into_iter().map(one).collect()
 }
 
 #[cfg(test)]

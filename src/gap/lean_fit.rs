@@ -42,13 +42,21 @@ const UNSETTLED_RAD: f64 = 0.004;
 /// A law whose linear part is negative costs one nat for this much and four for twice as much, rad/(m/s): a
 /// lean never goes against the wind. A wall; its steepness does not matter.
 const NEGATIVE: f64 = 1e-4;
+/// The same of a body, rad/(m/s)².
+const NEGATIVE_BODY: f64 = 1e-5;
 /// Variables of the search, in numbers near 1: mean wind (two), the law's linear and quadratic parts, and
 /// the logarithms of gusts and scatter.
 const COUNT: usize = 6;
 /// What one unit of each variable is. Numerical.
 const UNITS: [f64; COUNT] = [1.0, 1.0, 0.01, 0.001, 1.0, 1.0];
-/// Place of the law's linear part.
-const LINEAR: usize = 2;
+/// Place of the law's linear part, or of what a body adds to its quadratic part.
+const DRAG: usize = 2;
+/// What one unit of the latter is, rad/(m/s)². Numerical.
+const BODY_UNIT: f64 = 0.001;
+/// Prior standard deviation of the drag of a round body that the model lacks, rad/(m/s)²: 0.1 m² on 1 kg. Chosen wide.
+const BODY_DOUBT: f64 = 0.006;
+/// Such drags from which the search starts, rad/(m/s)².
+const BODIES: [f64; 3] = [0.0005, 0.002, 0.006];
 /// Place of its quadratic part.
 const SQUARE: usize = 3;
 /// Step of the second differences, in units. Numerical.
@@ -78,6 +86,26 @@ impl Point {
     }
 }
 
+/// What a model lacks that leans more than it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lacks {
+    /// Drag of the rotors, which is linear in the air speed.
+    Rotors,
+    /// Drag of a round body, which goes with its square.
+    Body,
+}
+
+/// A round body that the model lacks, by legs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Body {
+    /// Its part of the lean, rad/(m/s)².
+    pub square: f64,
+    /// Standard error of that.
+    pub square_se: f64,
+    /// By how much it explains the leans better than a drag of the rotors, nats.
+    pub better_nats: f64,
+}
+
 /// A law and a mean wind by legs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
@@ -93,34 +121,60 @@ pub(super) struct Fitted {
 
 /// Fits the law from the model's. The search starts from the model's own linear part and from what small
 /// rotors usually have: with too small a one the wind begins far too strong.
-pub(super) fn fit(mut points: Vec<Point>, model: LeanLaw) -> Fitted {
-    points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    let linear = model.linear.max(1e-4);
-    let square = model.square.max(1e-5);
-    let misfit = |at: &[f64; COUNT]| misfit(&points, &Candidate::of(at, model), [linear, square]);
-    let objective = |at: &[f64; COUNT]| misfit(at) + wall(&Candidate::of(at, model).law);
-    let search = |from: &f64| {
-        let [x, y] = hovering_wind(&points, LeanLaw { linear: *from, ..model });
-        let natural = [x, y, *from, square, GUST_MPS.ln(), SCATTER_RAD.ln()];
-        let mut start = [0.0; COUNT];
-        for (place, value) in start.iter_mut().enumerate() {
-            *value = natural[place] / UNITS[place];
-        }
-        minimise(start, objective, |at, value| differences(objective, at, value))
-    };
-    let ends: Vec<([f64; COUNT], f64)> =
-        [linear, USUAL_LINEAR[0], USUAL_LINEAR[1]].par_iter().map(search).collect();
-    let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
-    let at = best.map_or([0.0; COUNT], |(at, _)| at);
-    let found = Candidate::of(&at, model);
+pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
+    let points = in_order(points);
+    let (at, _) = most_probable(&points, model, Lacks::Rotors);
+    let found = Candidate::of(&at, model, Lacks::Rotors);
     // A wall is no knowledge: what is against it may be anything behind it.
-    let errors = standard_errors(&at, misfit);
+    let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Rotors));
     Fitted {
         law: found.law,
-        linear_se: errors[LINEAR],
+        linear_se: UNITS[DRAG] * errors[DRAG],
         mean_mps: found.mean_mps,
         mean_se_mps: errors[0].hypot(errors[1]) / std::f64::consts::SQRT_2,
     }
+}
+
+/// Fits a round body in place of a drag of the rotors.
+pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw) -> Body {
+    let points = in_order(points);
+    let ((at, least), (_, of_rotors)) = rayon::join(
+        || most_probable(&points, model, Lacks::Body),
+        || most_probable(&points, model, Lacks::Rotors),
+    );
+    let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Body));
+    Body {
+        square: BODY_UNIT * at[DRAG],
+        square_se: BODY_UNIT * errors[DRAG],
+        better_nats: of_rotors - least,
+    }
+}
+
+fn in_order(mut points: Vec<Point>) -> Vec<Point> {
+    points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    points
+}
+
+/// The most probable variables and their misfit.
+fn most_probable(points: &[Point], model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
+    let model = LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model };
+    let objective = |at: &[f64; COUNT]| misfit(points, at, model, lacks) + wall(at, lacks);
+    let search = |drag: &f64| {
+        let mut start =
+            [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
+        let [x, y] = hovering_wind(points, Candidate::of(&start, model, lacks).law);
+        (start[0], start[1]) = (x, y);
+        minimise(start, objective, |at, value| differences(objective, at, value))
+    };
+    let starts = match lacks {
+        Lacks::Rotors => {
+            [model.linear, USUAL_LINEAR[0], USUAL_LINEAR[1]].map(|linear| linear / UNITS[DRAG])
+        }
+        Lacks::Body => BODIES.map(|square| square / BODY_UNIT),
+    };
+    let ends: Vec<([f64; COUNT], f64)> = starts.par_iter().map(search).collect();
+    let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
+    best.unwrap_or(([0.0; COUNT], f64::INFINITY))
 }
 
 /// Mean wind that a law reads from the leans in hover and in vertical flight, m/s.
@@ -139,19 +193,23 @@ pub(super) fn hovering_wind(points: &[Point], law: LeanLaw) -> [f64; 2] {
 struct Candidate {
     mean_mps: [f64; 2],
     law: LeanLaw,
+    /// Quadratic part of the law without a body that the model lacks, rad/(m/s)².
+    square: f64,
     gust_mps: f64,
     scatter_rad: f64,
 }
 
 impl Candidate {
-    fn of(at: &[f64; COUNT], model: LeanLaw) -> Self {
+    fn of(at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> Self {
+        let square = at[SQUARE] * UNITS[SQUARE];
+        let law = match lacks {
+            Lacks::Rotors => LeanLaw { linear: at[DRAG] * UNITS[DRAG], square, ..model },
+            Lacks::Body => model.with_square(square).with_body(at[DRAG] * BODY_UNIT),
+        };
         Self {
             mean_mps: [at[0], at[1]],
-            law: LeanLaw {
-                linear: at[LINEAR] * UNITS[LINEAR],
-                square: at[SQUARE] * UNITS[SQUARE],
-                ..model
-            },
+            law,
+            square,
             gust_mps: at[4].exp(),
             scatter_rad: at[5].exp(),
         }
@@ -161,7 +219,8 @@ impl Candidate {
 /// Minus the logarithm of the posterior density, without its constant: each lean is the law's in the mean
 /// wind, and gusts change it by the law's slopes there. (The other way round, from leans to the wind, a law
 /// without a linear part has no slope where a lean is small.)
-fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> f64 {
+fn misfit(points: &[Point], at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> f64 {
+    let of = Candidate::of(at, model, lacks);
     let gust = State { variance: of.gust_mps * of.gust_mps, time_s: GUST_S };
     let shear = State { variance: SHEAR * SHEAR, time_s: f64::INFINITY };
     let middle = mean(points.iter().map(|point| point.ln_height)).unwrap_or_default();
@@ -187,19 +246,27 @@ fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> 
     }
     let (log_det, chi2) = log_det_and_chi2(&[gust, gust, shear], &seen, &off);
     let square = |value: f64| value * value;
-    let known = square((of.law.square.max(1e-7) / square_part).ln() / SQUARE_DOUBT)
-        + square((of.law.linear - linear) / LINEAR_DOUBT)
+    let drag = match lacks {
+        Lacks::Rotors => (of.law.linear - model.linear.max(1e-4)) / LINEAR_DOUBT,
+        Lacks::Body => at[DRAG] * BODY_UNIT / BODY_DOUBT,
+    };
+    let known = square((of.square.max(1e-7) / model.square.max(1e-5)).ln() / SQUARE_DOUBT)
+        + square(drag)
         + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
         + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln());
     0.5 * (log_det + chi2 + known)
 }
 
-/// Cost of a law by which a drone would lean against the wind, nats.
-fn wall(law: &LeanLaw) -> f64 {
-    (law.linear.min(0.0) / NEGATIVE).powi(2)
+/// Cost of a drag by which a drone would lean against the wind, nats.
+fn wall(at: &[f64; COUNT], lacks: Lacks) -> f64 {
+    let negative = match lacks {
+        Lacks::Rotors => NEGATIVE / UNITS[DRAG],
+        Lacks::Body => NEGATIVE_BODY / BODY_UNIT,
+    };
+    (at[DRAG].min(0.0) / negative).powi(2)
 }
 
-/// Standard errors in natural units, by the curvature at the bottom; infinite where it has none.
+/// Standard errors in the search's units, by the curvature at the bottom; infinite where it has none.
 fn standard_errors(at: &[f64; COUNT], objective: impl Fn(&[f64; COUNT]) -> f64) -> [f64; COUNT] {
     let moved = |a: usize, by_a: f64, b: usize, by_b: f64| {
         let mut place = *at;
@@ -217,7 +284,7 @@ fn standard_errors(at: &[f64; COUNT], objective: impl Fn(&[f64; COUNT]) -> f64) 
     for (place, error) in errors.iter_mut().enumerate() {
         let variance = inverse.map_or(f64::INFINITY, |inverse| inverse[(place, place)]);
         if variance > 0.0 {
-            *error = UNITS[place] * variance.sqrt();
+            *error = variance.sqrt();
         }
     }
     errors

@@ -21,7 +21,7 @@ use super::regimes::regimes;
 use super::sensor::sensor;
 use super::stand_in::stand_in;
 use super::verdict::{
-    DataUsed, Drones, Finding, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
+    DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
     VERDICT_SCHEMA, Verdict,
 };
 use super::warning::warnings;
@@ -177,8 +177,15 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     let mut steps = found.steps.clone();
     steps.extend(spread);
-    // Momentum drag on all axes took the place of what the leans told.
-    let instead = |one: &Parameter| Role::MomentumDrag.is_of(one.effect);
+    // Momentum drag on all axes took the place of what the leans told, or the pulse named the same body.
+    let of_body = leans.as_ref().and_then(|step| step.finding.effects().first().copied());
+    let of_body = of_body.filter(|first| Role::BodyDragTop.is_of(first)).map(str::to_owned);
+    if let Some(body) = of_body.as_deref().filter(|_| !Role::BodyDragTop.is_on(vehicle)) {
+        as_new(&mut steps, body);
+    }
+    let instead = |one: &Parameter| {
+        Role::MomentumDrag.is_of(one.effect) || of_body.as_deref() == Some(one.effect)
+    };
     steps.extend(leans.filter(|_| !found.parameters.iter().any(instead)));
     let cautions = warnings(&data, &found, &shrink, input);
     let mut verdict = Verdict {
@@ -311,6 +318,20 @@ fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
     vehicle
 }
 
+/// Tells an effect as new that the model got from the leans before the pulse was searched.
+fn as_new(steps: &mut [Step], effect: &str) {
+    for step in steps {
+        if let Finding::Name { effect: name, parameters, was_there } = &mut step.finding
+            && name == effect
+        {
+            *was_there = false;
+            for one in parameters {
+                one.before = None;
+            }
+        }
+    }
+}
+
 /// What is told from other channels than the fleet's pulse: what makes drones differ, by their
 /// offsets; the drag of the rotors, by the lean.
 fn add_others(model: &mut Vehicle, steps: &[Step]) {
@@ -321,12 +342,29 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
         else {
             continue;
         };
+        let mut areas = Vec::new();
         for role in [Role::RotorDrag, Role::MassSpread, Role::ThrustSpread] {
             if let Some(place) = role.place().filter(|place| place.name() == *first)
                 && let Some(size) = parameters.first()
             {
                 role.set(model, size.value.value.min(place.parameter.high));
             }
+        }
+        // A body that the leans told is a round one, until the pulse tells its top.
+        if !Role::BodyDragTop.is_on(model) {
+            for role in [Role::BodyDragTop, Role::BodyDragSide] {
+                let is_it = |one: &&Fitted| {
+                    role.place().is_some_and(|place| {
+                        place.name() == *first && place.parameter.name == one.name
+                    })
+                };
+                if let Some(area) = parameters.iter().find(is_it) {
+                    areas.push((role, area.value.value));
+                }
+            }
+        }
+        for (role, area_m2) in areas {
+            role.set(model, area_m2);
         }
     }
 }

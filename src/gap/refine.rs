@@ -318,28 +318,26 @@ fn parameter(definition: &Definition, name: &str) -> Option<Parameter> {
     })
 }
 
-/// Standard errors of parameters at the vehicle's own values, and of the coefficients of further
-/// regressors, with the noise that the flight shows.
+/// Standard errors of the shares of what is known to be there, each by its trace in the pulse, with everything else free;
+/// `parameters` are the sizes of the effects among them.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub(super) fn size_errors(
+pub(super) fn trace_errors(
     comparison: &Comparison,
     vehicle: &Vehicle,
     parameters: &[Parameter],
-    extras: &[Column],
-) -> Result<(Vec<f64>, Vec<f64>), GapError> {
+    traces: &[Column],
+) -> Result<Vec<f64>, GapError> {
     let patterns = comparison.patterns(vehicle, 0.0)?;
     let split = Split::of(&comparison.residual(vehicle, 0.0)?);
-    let slopes = slopes(comparison, vehicle, parameters)?;
     let doubts = doubts(comparison, vehicle, parameters)?;
-    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
+    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(traces);
     let solution = problem.fit(Hyper::default(), Likelihood::Restricted);
     let covariance = solution.covariance();
-    let sizes = solution.beta.len() - parameters.len();
+    let first = solution.beta.len() - traces.len();
     let se = |place: usize| covariance[(place, place)].max(0.0).sqrt();
-    let of = |first: usize, count: usize| (first..first + count).map(se).collect();
-    Ok((of(sizes, parameters.len()), of(sizes - extras.len(), extras.len())))
+    Ok((first..first + traces.len()).map(se).collect())
 }
 
 /// Standard errors in half of a 95 % interval: the strength of the shared air is estimated from as many

@@ -33,12 +33,13 @@ pub(super) type Point = [f64; SCALES];
 
 /// What is known before the values are seen: mean and standard deviation of each scale. A field day has 0.5 m/s,
 /// 145 m and 186 s (docs/physics.md, 4.1); the priors reach from a tenth to ten times that and more, and only
-/// matter where the values say nothing. A field drifts with the wind, or does not.
+/// matter where the values say nothing. Rolls of the boundary layer are three times as long as wide and more. A field drifts with
+/// the wind, or does not.
 pub(super) const PRIOR: [(f64, f64); SCALES] = [
     (-1.2, 1.5),
     (4.7, 1.0),
-    (0.0, 0.35),
-    (0.0, 0.35),
+    (0.0, 0.6),
+    (0.0, 0.6),
     (5.2, 1.1),
     (0.9, 0.4),
     (-2.3, 1.5),
