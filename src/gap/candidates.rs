@@ -620,6 +620,26 @@ mod tests {
         assert!((-0.1..0.0).contains(&share(first)), "and hardly any before: {}", share(first));
     }
 
+    #[test]
+    fn in_wind_a_new_body_is_tried_flat_and_round() {
+        let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let sides = |comparison: &Comparison| -> Vec<f64> {
+            let found = one(&trial::vehicle(), comparison, Updraft::Same, "parasitic-drag");
+            let variants = found.unwrap().unwrap().variants;
+            let of = |variant: &Variant| {
+                let area = |role: Role| role.value(variant.vehicle.as_ref().unwrap()).unwrap();
+                area(Role::BodyDragSide) / area(Role::BodyDragTop)
+            };
+            variants.iter().map(of).collect()
+        };
+        let still = sides(&comparison);
+        assert!(still.iter().all(|sides| (sides - still[0]).abs() < 1e-9 && *sides < 0.2));
+        comparison.wind.mean_mps = [3.0, 4.0];
+        let blown = sides(&comparison);
+        assert_eq!(blown.iter().filter(|sides| (*sides - ROUND).abs() < 1e-9).count(), still.len());
+        assert_eq!(blown.len(), 2 * still.len());
+    }
+
     /// The model's current is that of its own motors, and the drones' may be another: the product of resistance and current
     /// is what the voltage falls by.
     #[test]

@@ -95,9 +95,11 @@ pub(super) fn decide(
     options: &Options,
     step: usize,
 ) -> Decision {
-    // Who is held against others alone is flown whatever it explains: how well it does is compared then.
-    let floor = if options.only.is_some() { HELD_NATS } else { FLOOR_NATS };
-    let mut limits = Thresholds { library: floor, generic: FREE_FLOOR_NATS };
+    // Who is held against others alone is flown when it may be as good: how well it does is compared then.
+    let is_held = options.only.is_some();
+    let floor = if is_held { HELD_NATS } else { FLOOR_NATS };
+    let mut limits = Thresholds { library: FLOOR_NATS, generic: FREE_FLOOR_NATS };
+    let needed = |limits: &Thresholds| if is_held { floor } else { limits.library };
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
     // What has so much freedom must show in the means, whatever it does to the scatter.
     let free = round.generics.iter().find(|free| {
@@ -132,7 +134,7 @@ pub(super) fn decide(
     let best = round.library.iter().find(is_named);
     let best_gain = best.map_or(0.0, |best| best.gain);
     let free_gain = free.map_or(0.0, |free| free.gain);
-    if best_gain < limits.library && free_gain < limits.generic {
+    if best_gain < needed(&limits) && free_gain < limits.generic {
         return nothing(limits);
     }
     let seed = options.seed.wrapping_add(1000 * step as u64);
@@ -143,7 +145,7 @@ pub(super) fn decide(
     if let Some(free) =
         free.filter(|free| free.gain > limits.generic && free.gain > FREE_BETTER * best_gain)
     {
-        let left = match best.filter(|best| best.gain > limits.library) {
+        let left = match best.filter(|best| best.gain > needed(&limits)) {
             None => free.gain,
             Some(best) => left_with(problem, sought, best, free),
         };
@@ -158,16 +160,16 @@ pub(super) fn decide(
         round.generics.iter().find(|free| {
             let depends_on = sought.generics[free.generic].depends_on;
             let simple = SIMPLE.iter().find(|one| one.0 == depends_on);
-            let needed = |more: f64| limits.generic.max(best_gain + share_of_more * more);
+            let least = |more: f64| limits.generic.max(best_gain + share_of_more * more);
             free.size_us >= material_us
                 && free.plain > FREE_FLOOR_NATS
-                && simple.is_some_and(|(_, more)| free.gain > needed(*more))
+                && simple.is_some_and(|(_, more)| free.gain > least(*more))
         })
     };
     if let Some(simple) = simple(1.0) {
         return Decision { what: What::Free(simple.clone()), thresholds: limits };
     }
-    let Some(best) = best.filter(|best| best.gain > limits.library) else {
+    let Some(best) = best.filter(|best| best.gain > needed(&limits)) else {
         return nothing(limits);
     };
     let column = |ranked: &Ranked| form(sought, ranked);
@@ -394,6 +396,49 @@ mod tests {
         let short = |gain| Ranked { size_us: 0.1, range_us: MATERIAL_US, ..ranked(0, gain) };
         assert_eq!(case.decided(&[short(14.0)], &[]).0, "nothing");
         assert_eq!(case.decided(&[short(14.0 + 1e-9)], &[]).0, "effects");
+    }
+
+    #[test]
+    fn a_wake_that_is_plain_in_the_means_matters_by_what_it_does_there() {
+        let mut case = case();
+        let own = |value: fn(usize, usize) -> f64| {
+            let drones = |group: &GroupPattern| {
+                let bins = 0..group.time_s.len();
+                (0..group.drones)
+                    .map(move |drone| bins.clone().map(|bin| value(drone, bin)).collect())
+            };
+            Column::Own(case.groups.iter().map(|group| drones(group).collect()).collect())
+        };
+        let of_all = own(|drone, bin| 0.1 * (drone + 10 * bin) as f64);
+        // Three drones in the first group, two in the second: what one has more, another has less.
+        let of_each = own(|drone, bin| match drone {
+            0 => bin as f64,
+            1 => -(bin as f64),
+            _ => 0.0,
+        });
+        case.library[0] = effect("one", of_all, true);
+        case.library[2] = effect("another", of_each, true);
+        let short = |candidate, plain| {
+            let whole = Ranked { size_us: 0.1, range_us: 9.0, ..ranked(candidate, 20.0) };
+            case.decided(&[Ranked { plain, ..whole }], &[]).0
+        };
+        assert_eq!(short(0, 20.0), "effects", "5 us from the first bin to the last");
+        assert_eq!(short(0, 13.9), "nothing", "only the scatter shows it so plainly");
+        assert_eq!(short(2, 20.0), "nothing", "the means have nothing of it");
+    }
+
+    #[test]
+    fn who_is_held_against_others_needs_half_of_what_finds_it() {
+        let case = case();
+        let alone = Options {
+            only: Some(super::super::explain::Only { effect: "one", updraft_mps: 0.0 }),
+            ..BY_FLOORS
+        };
+        let is_taken = |gain| {
+            let decision = case.decision(&[ranked(0, gain)], &[], &alone);
+            matches!(decision.what, What::Effects { .. })
+        };
+        assert!(!is_taken(4.0) && is_taken(4.0 + 1e-9));
     }
 
     #[test]

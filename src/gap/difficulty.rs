@@ -67,6 +67,9 @@ pub fn fisher_z(
     Ok(columns.iter().map(z).collect())
 }
 
+/// A size before that is a smaller share of what it is now was none. Numerical.
+const NONE_SHARE: f64 = 1e-6;
+
 /// All that an effect does to the pulse, from the size it would have without `change`: not its derivative, which for what goes
 /// with the square of its size is twice as much.
 fn of_effect(
@@ -77,7 +80,12 @@ fn of_effect(
 ) -> Result<Column, GapError> {
     let now = value_of(vehicle, size.effect, size.name).unwrap_or(change);
     let mut without = vehicle.clone();
-    set(&mut without, size.effect, size.name, now - change);
+    let before = now - change;
+    if before.abs() > NONE_SHARE * now.abs() {
+        set(&mut without, size.effect, size.name, before);
+    } else {
+        without.effects.remove(size.effect);
+    }
     match comparison.change(&without, vehicle) {
         Err(EffectError::NotFlown { .. }) => {
             let slopes = slopes(comparison, vehicle, std::slice::from_ref(size))?;
@@ -95,4 +103,35 @@ fn column(comparison: &Comparison, pulse_us: &SteadyPulse<'_>) -> Column {
         signals.iter().zip(headings).map(|(signals, heading)| pulse_us(signals, *heading)).collect()
     };
     Column::Shared(groups.map(group).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+
+    /// The trace of an effect is the difference of flights with and without it, however it bends on the way.
+    #[test]
+    fn what_is_there_is_all_that_the_effect_does() {
+        let comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let size = size_of("thrust-curve", "expo").unwrap();
+        let with = |expo: f64| {
+            let mut vehicle = trial::vehicle();
+            set(&mut vehicle, "thrust-curve", "expo", expo);
+            vehicle
+        };
+        let trace = of_effect(&comparison, &with(0.6), &size, 0.6).unwrap();
+        let expected = comparison.change(&with(0.0), &with(0.6)).unwrap();
+        let bins = 0..comparison.data.groups[0].bins.len();
+        for bin in bins {
+            let (found, expected) = (trace.at(0, 0, bin), expected.at(0, 0, bin));
+            assert!((found - expected).abs() < 1e-9, "{bin}: {found} {expected}");
+        }
+        assert!(trace.range() > 1.0, "{}", trace.range());
+        // An effect whose size may not be zero is not there at all.
+        let size = size_of("ground-effect", "radius_m").unwrap();
+        let mut vehicle = trial::vehicle();
+        set(&mut vehicle, "ground-effect", "radius_m", 0.2);
+        assert!(of_effect(&comparison, &vehicle, &size, 0.2).is_ok());
+    }
 }

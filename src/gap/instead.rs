@@ -111,11 +111,14 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
     names.truncate(MOST);
     names.extend(lead);
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
-    // only be that name's stand-in.
+    // only be that name's stand-in, unless leans tell a drag of the rotors.
     let axial = [Role::InflowShare, Role::BodyDragTop];
-    if steps.len() > 1
-        && let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
-        && names.iter().any(|name| axial.iter().any(|role| role.is_of(name)))
+    let is_asked = |name: &&'static str| {
+        steps.len() > 1 && axial.iter().any(|role| role.is_of(name)) || Role::RotorDrag.is_of(name)
+    };
+    if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
+        && names.iter().any(is_asked)
+        && !names.contains(&drag)
     {
         names.push(drag);
     }

@@ -75,21 +75,19 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
     // Whose drag it is the speeds tell: that of rotors is linear, that of a body goes with the square.
     let body = before.body_told();
     let nats = body.map_or(f64::NEG_INFINITY, |(body, _)| body.better_nats);
-    let (effects, parameters) = match body {
-        Some(told) if nats > CLASS_NATS => (bodies(), of_body(told)?),
+    let parameters = match body {
+        Some(told) if nats > CLASS_NATS => of_body(told)?,
         _ => {
-            let mut effects = alike();
-            effects.extend(bodies().into_iter().take(usize::from(nats > -CLASS_NATS)));
             let place = Role::RotorDrag.place()?;
-            let fitted = Fitted {
+            vec![Fitted {
                 name: place.parameter.name.to_owned(),
                 unit: place.parameter.unit.to_owned(),
                 value: wind.lean_per_mps?,
                 before: Role::RotorDrag.value(&before.vehicle),
-            };
-            (effects, vec![fitted])
+            }]
         }
     };
+    let effects = names(nats);
     Some(Step {
         finding: Finding::Class { effects, parameters },
         gain_nats: 0.5 * z * z,
@@ -100,6 +98,18 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         shape: None,
         in_field: None,
     })
+}
+
+/// Names of a drag that leans tell, by how much better a body explains them than rotors do, nats.
+fn names(better_nats: f64) -> Vec<String> {
+    if better_nats > CLASS_NATS {
+        return bodies();
+    }
+    let mut effects = alike();
+    if better_nats > -CLASS_NATS {
+        effects.extend(bodies());
+    }
+    effects
 }
 
 /// Effects that lean a drone with the square of the air speed: a body besides that of the model, and another drag of its own
@@ -135,6 +145,25 @@ mod tests {
     use super::super::lean::Measured;
     use super::super::trial;
     use super::*;
+
+    #[test]
+    fn speeds_tell_a_body_from_rotors() {
+        assert_eq!(names(6.1), ["parasitic-drag", "face-drag"]);
+        let all = ["blade-flapping", "momentum-drag", "parasitic-drag", "face-drag"];
+        assert_eq!([names(5.9), names(-5.9)], [all, all]);
+        assert_eq!(names(-6.1), all[..2]);
+        assert_eq!(names(f64::NEG_INFINITY), all[..2], "no legs");
+    }
+
+    #[test]
+    fn areas_of_a_round_body_are_alike_and_never_negative() {
+        let body = Body { square: 0.002, square_se: 0.0012, better_nats: 9.0 };
+        let found = of_body((body, 0.05)).unwrap();
+        assert_eq!(found[0].value, found[1].value);
+        let Interval { value, low, high } = found[0].value;
+        assert!((value - 0.04).abs() < 1e-12 && low == 0.0 && (high - 0.088).abs() < 1e-12);
+        assert!(of_body((Body { square_se: f64::INFINITY, ..body }, 0.05)).is_none());
+    }
 
     #[test]
     fn leans_do_not_tell_which_drag_it_is() {

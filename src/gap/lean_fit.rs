@@ -340,6 +340,20 @@ mod tests {
     }
 
     #[test]
+    fn a_round_body_is_told_from_a_drag_of_the_rotors() {
+        let more = 0.003;
+        let body = fit_body(flown(law().with_body(more), 0.14), law());
+        assert!(body.better_nats > 10.0, "{body:?}");
+        assert!((body.square - more).abs() < 3.0 * body.square_se, "{body:?}");
+        assert!(body.square_se < 0.2 * more, "{body:?}");
+        let rotors = LeanLaw { linear: law().linear + 0.02, ..law() };
+        let body = fit_body(flown(rotors, 0.14), law());
+        assert!(body.better_nats < -10.0, "{body:?}");
+        let body = fit_body(flown(law(), 0.14), law());
+        assert!(body.better_nats.abs() < 6.0, "nothing is missing: {body:?}");
+    }
+
+    #[test]
     fn a_law_at_the_wall_is_not_known_by_the_wall() {
         let without = LeanLaw { linear: 0.0, ..law() };
         let found = fit(flown(without, 0.0), law());

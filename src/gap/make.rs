@@ -377,6 +377,38 @@ mod tests {
     use crate::flight::{Flight, Series};
     use crate::gap::bins::BinValues;
 
+    #[test]
+    fn a_body_that_leans_told_is_round_and_new() {
+        let area = |name: &str, value: f64| Fitted {
+            name: name.to_owned(),
+            unit: "m²".to_owned(),
+            value: Interval { value, low: 0.0, high: 1.0 },
+            before: None,
+        };
+        let parameters = vec![area("vertical_m2", 0.03), area("horizontal_m2", 0.03)];
+        let effects = vec!["parasitic-drag".to_owned(), "face-drag".to_owned()];
+        let told = trial::step(Finding::Class { effects, parameters }, 20.0, &[]);
+        let mut model = trial::vehicle();
+        model.effects.clear();
+        add_others(&mut model, std::slice::from_ref(&told));
+        let areas = [Role::BodyDragTop, Role::BodyDragSide].map(|role| role.value(&model));
+        assert_eq!(areas, [Some(0.03), Some(0.03)]);
+        // A body that the pulse was fitted with stays.
+        Role::BodyDragTop.set(&mut model, 0.02);
+        add_others(&mut model, &[told]);
+        assert_eq!(Role::BodyDragTop.value(&model), Some(0.02));
+        let before = Fitted { before: Some(0.03), ..area("vertical_m2", 0.02) };
+        let again = Finding::Name {
+            effect: "parasitic-drag".to_owned(),
+            parameters: vec![before],
+            was_there: true,
+        };
+        let mut steps = vec![trial::step(again, 20.0, &[])];
+        as_new(&mut steps, "parasitic-drag");
+        let Finding::Name { parameters, was_there, .. } = &steps[0].finding else { panic!() };
+        assert!(!was_there && parameters[0].before.is_none());
+    }
+
     /// Logs of a small fleet that flies as its model says, and what the held-out drones have more in their
     /// pulses, us by m/s of climb.
     fn logs(drones: usize, held_us_per_mps: f64) -> Vec<Flight> {

@@ -17,6 +17,10 @@ const POINTS: usize = 48;
 /// costs a tenth of the points. Numerical: of those tried it finds a ridge of three times the first guess and still has most
 /// points that count where the guess was right.
 const WIDER: [f64; 4] = [1.4, 1.6, 1.4, 1.2];
+/// Rounds go on, as the last of them, until so many points count. Numerical: an interval by 40 points is known to a tenth.
+const COUNT: f64 = 40.0;
+/// At most this many rounds.
+const MOST_ROUNDS: usize = 8;
 /// Each fifth point is drawn wider still by this, for tails that no round has seen yet.
 const FAR: f64 = 2.0;
 /// See [`FAR`].
@@ -123,7 +127,12 @@ pub(super) fn samples<T: Send>(
     let mut ln_evidence = f64::NEG_INFINITY;
     let mut drawn: Vec<Drawn<T>> = Vec::new();
     let mut proposals: Vec<Proposal<'_>> = Vec::new();
-    for (round, wider) in WIDER.into_iter().enumerate() {
+    for round in 0..MOST_ROUNDS {
+        let weights: Vec<f64> = drawn.iter().map(|one| one.weight).collect();
+        let Some(wider) = WIDER.get(round).or(WIDER.last()).copied() else { break };
+        if round >= WIDER.len() && effective(&weights) > COUNT {
+            break;
+        }
         let shape = if round == 0 { Some(Shape::Split(found)) } else { next(&drawn, found) };
         proposals.extend(shape.map(|shape| Proposal { shape, wider }));
         let Some(proposal) = proposals.last() else { break };
