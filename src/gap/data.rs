@@ -444,10 +444,41 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
 mod tests {
     use super::super::trial;
     use super::*;
+    use crate::flight::Series;
     use crate::mission::resolve::{Override, resolve};
 
     fn slots(data: &Data) -> Vec<u16> {
         data.groups.iter().flat_map(|group| group.slots.clone()).collect()
+    }
+
+    #[test]
+    fn the_current_of_a_flight_is_that_of_its_longest_time_under_arms() {
+        let log = |ohm: f64, amps: f64| {
+            let time_s: Vec<f64> = (0..300).map(f64::from).collect();
+            let flown = |time_s: &f64| if (100.0..200.0).contains(time_s) { amps } else { 0.3 };
+            let value = time_s.iter().map(flown).collect();
+            let current = Series { time_s, value };
+            Flight {
+                // Armed and given up, flown, armed again after it.
+                armed_s: vec![(0.0, 60.0), (100.0, 200.0), (220.0, 290.0)],
+                current_a: Some(current),
+                resistance_ohm: Some(ohm),
+                ..Flight::default()
+            }
+        };
+        let mut logs = vec![log(0.02, 8.0), log(0.03, 9.0), log(0.04, 10.0)];
+        let loaded = |logs: &[Flight]| {
+            load(&logs.iter().map(|flight| Flown { slot: 1, flight }).collect::<Vec<_>>())
+        };
+        let Load { resistance_ohm, flown_a } = loaded(&logs).unwrap();
+        assert_eq!((resistance_ohm, flown_a), (0.03, Some(9.0)));
+        // A sensor that reads nothing tells no current, and a resistance that no battery has is none.
+        for one in &mut logs {
+            one.current_a = None;
+        }
+        assert_eq!(loaded(&logs).unwrap().flown_a, None);
+        logs.iter_mut().for_each(|one| one.resistance_ohm = Some(1.5));
+        assert!(loaded(&logs).is_none());
     }
 
     #[test]

@@ -678,6 +678,50 @@ mod tests {
     use super::super::trial;
     use super::*;
 
+    fn begun<'a>(
+        data: &'a Data,
+        vehicle: &'a Vehicle,
+        (simulated, options, flights): (&'a Simulated<'a>, &'a Options, &'a ModelFlights),
+        comparison: Comparison,
+    ) -> Search<'a> {
+        Search {
+            data,
+            vehicle,
+            lacked_drag: false,
+            simulated,
+            plan: None,
+            options,
+            flights,
+            found: Found::nothing(comparison.clone()),
+            comparison,
+            refused: Vec::new(),
+            last: None,
+        }
+    }
+
+    #[test]
+    fn what_the_model_cannot_fly_with_is_refused_and_counts_as_no_step() {
+        let data = trial::data(2, |_, _| 0.0);
+        let vehicle = trial::vehicle();
+        let (simulated, options) = (Simulated::Closed, Options::default());
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let flights = ModelFlights::default();
+        let mut search = begun(&data, &vehicle, (&simulated, &options, &flights), comparison);
+        let found = |effect: &str, size: &str, search: &mut Search<'_>| {
+            search.found.parameters.extend(refine::size_of(effect, size));
+            search.found.steps.push(trial::step(trial::name(effect), 20.0, &[]));
+        };
+        found("thrust-curve", "expo", &mut search);
+        let before = (search.comparison.clone(), search.found.clone());
+        found("battery", "exponent", &mut search);
+        assert!(search.gives_up(before.clone()));
+        assert_eq!(search.refused, ["battery"], "not what was found before");
+        assert_eq!(search.found.steps.len(), 1);
+        assert!(!search.gives_up(before), "nothing was taken up: another reason");
+        let look = search.look(In::Present(None)).unwrap();
+        assert!(look.candidates.iter().all(|one| one.name != "battery"), "it is not tried again");
+    }
+
     #[test]
     fn a_model_that_is_flown_again_still_doubts_the_mean_of_few_drones() {
         let data = trial::data(4, |_, _| 0.0);
@@ -686,19 +730,8 @@ mod tests {
         let (simulated, options) = (Simulated::Closed, Options::default());
         let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
         let first = comparison.spread_doubts(&comparison.vehicle).unwrap();
-        let search = Search {
-            data: &data,
-            vehicle: &vehicle,
-            lacked_drag: false,
-            simulated: &simulated,
-            plan: None,
-            options: &options,
-            flights: &ModelFlights::default(),
-            found: Found::nothing(comparison.clone()),
-            comparison,
-            refused: Vec::new(),
-            last: None,
-        };
+        let flights = ModelFlights::default();
+        let search = begun(&data, &vehicle, (&simulated, &options, &flights), comparison);
         let again = search.against_model().unwrap();
         assert!(!first.is_empty(), "four drones are not the fleet");
         assert_eq!(again.spread_doubts(&search.found.vehicle).unwrap(), first);
