@@ -12,7 +12,7 @@ use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Only, Options};
 use super::verdict::{Finding, Step};
-use crate::effects::{Role, find};
+use crate::effects::{LIBRARY, Role, Sought, find};
 
 /// Effects that are flown in place of what was found, at most. Chosen to bound the time.
 const MOST: usize = 5;
@@ -110,6 +110,17 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
     }
     names.truncate(MOST);
     names.extend(lead);
+    // What is unknown in this updraft may be any effect of the climb in another.
+    let is_of_climb = |step: &Step| match &step.finding {
+        Finding::Unknown { depends_on, .. } => *depends_on == Dependence::Climb,
+        Finding::Name { .. } | Finding::Class { .. } => false,
+    };
+    if steps.iter().any(is_of_climb) {
+        let shapes = LIBRARY.iter().map(|effect| effect.definition());
+        let sought = shapes.filter(|one| matches!(one.sought, Sought::Shape { .. }));
+        let all = sought.map(|one| one.name).filter(|name| depends_on_climb(name));
+        names.extend(all.filter(|name| !names.contains(name)).collect::<Vec<_>>());
+    }
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
     // only be that name's stand-in, unless leans tell a drag of the rotors.
     let axial = [Role::InflowShare, Role::BodyDragTop];
@@ -173,6 +184,14 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
         if !names.contains(&name) {
             names.push(name);
         }
+    }
+    // A shape that explains nearly as much is no less likely than one effect in an updraft of its own.
+    if is_unknown && is_instead && best.nats < there.nats + CLASS_NATS {
+        let shape = there.found.steps.iter().find_map(|step| match &step.finding {
+            Finding::Unknown { depends_on, .. } => Some(depends_on.name().to_owned()),
+            Finding::Name { .. } | Finding::Class { .. } => None,
+        });
+        names.extend(shape);
     }
     let ended = if is_instead { others.swap_remove(0) } else { there };
     // Elsewhere the model itself explains nearly as much: what the updraft then leaves of the climb is in doubt.
@@ -322,5 +341,32 @@ mod tests {
         let inflow = [("rotor-inflow", 25.0)];
         let two = [step("thrust-curve", 26.0, &inflow), step("battery", 26.0, &[])];
         assert_eq!(rivals(&two), ["rotor-inflow", "momentum-drag"], "no round looks for it");
+        // So has a drag of the rotors that leans told, also beside a single name.
+        let by_lean =
+            [step("translational-lift/blade-flapping", 26.0, &[("blade-flapping", 24.0)])];
+        assert!(rivals(&by_lean).contains(&"momentum-drag"));
+    }
+
+    #[test]
+    fn what_is_unknown_of_the_climb_is_held_against_each_effect_of_the_climb() {
+        let unknown = |depends_on: Dependence| {
+            let finding = Finding::Unknown { depends_on, formula: None };
+            trial::step(finding, 60.0, &[("climb", 60.0), ("rotor-inflow", 40.0)])
+        };
+        let all = rivals(&[unknown(Dependence::Climb)]);
+        assert_eq!(all[0], "rotor-inflow", "the likeliest first");
+        for effect in ["parasitic-drag", "thrust-curve", "vortex-ring", "face-drag"] {
+            assert!(all.contains(&effect), "{effect}");
+        }
+        assert!(!all.contains(&"battery") && !all.contains(&"turbulence"));
+        assert_eq!(rivals(&[unknown(Dependence::Height)]), ["rotor-inflow"]);
+        let instead = |nats: f64| {
+            let mut there = ended(0.0, &[]);
+            there.found.steps = vec![unknown(Dependence::Climb)];
+            told(there, vec![ended(nats, &["parasitic-drag"])])
+        };
+        assert_eq!(instead(5.0), ["parasitic-drag/climb"]);
+        assert_eq!(instead(7.0), ["parasitic-drag"]);
+        assert!(!instead(-1.0).concat().contains("parasitic-drag"));
     }
 }

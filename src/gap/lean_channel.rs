@@ -9,6 +9,7 @@ use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
 use crate::numeric::extent;
+use crate::vehicle::Vehicle;
 
 /// Half of a 95 % interval in standard errors, rounded up from 1.96.
 const HALF: f64 = 2.0;
@@ -67,28 +68,31 @@ pub(super) fn alike() -> Vec<String> {
 /// Drag that the model lacks, or has with another size: a class, because leans do not tell its kind.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
-    let apart = apart(measured.law, wind.model_lean_per_mps);
-    let z = apart.abs() / measured.linear_se.hypot(FORM);
-    if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
-        return None;
-    }
     // Whose drag it is the speeds tell: that of rotors is linear, that of a body goes with the square.
     let body = before.body_told();
     let nats = body.map_or(f64::NEG_INFINITY, |(body, _)| body.better_nats);
-    let parameters = match body {
-        Some(told) if nats > CLASS_NATS => of_body(told)?,
-        _ => {
-            let place = Role::RotorDrag.place()?;
-            vec![Fitted {
-                name: place.parameter.name.to_owned(),
-                unit: place.parameter.unit.to_owned(),
-                value: wind.lean_per_mps?,
-                before: Role::RotorDrag.value(&before.vehicle),
-            }]
-        }
+    let apart = apart(measured.law, wind.model_lean_per_mps);
+    let of_rotors = apart.abs() / measured.linear_se.hypot(FORM);
+    let (z, effects, parameters) = if apart.abs() >= MATERIAL && of_rotors >= NAMED_Z {
+        let parameters = match body {
+            Some(told) if nats > CLASS_NATS => of_body(told, &before.vehicle)?,
+            _ => {
+                let place = Role::RotorDrag.place()?;
+                vec![Fitted {
+                    name: place.parameter.name.to_owned(),
+                    unit: place.parameter.unit.to_owned(),
+                    value: wind.lean_per_mps?,
+                    before: Role::RotorDrag.value(&before.vehicle),
+                }]
+            }
+        };
+        (of_rotors, names(nats), parameters)
+    } else {
+        // Rotors may not explain what a body does.
+        let told = body.filter(|(body, _)| is_told(body))?;
+        (told.0.square / told.0.square_se, bodies(), of_body(told, &before.vehicle)?)
     };
-    let effects = names(nats);
-    Some(Step {
+    z.is_finite().then(|| Step {
         finding: Finding::Class { effects, parameters },
         gain_nats: 0.5 * z * z,
         threshold_nats: 0.5 * NAMED_Z * NAMED_Z,
@@ -98,6 +102,13 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         shape: None,
         in_field: None,
     })
+}
+
+/// Whether a body is told by itself: no drag of the rotors explains as much, by twice the margin of a class.
+fn is_told(body: &Body) -> bool {
+    body.better_nats > 2.0 * CLASS_NATS
+        && body.square * LEG_MPS > MATERIAL
+        && body.square > NAMED_Z * body.square_se
 }
 
 /// Names of a drag that leans tell, by how much better a body explains them than rotors do, nats.
@@ -119,12 +130,23 @@ fn bodies() -> Vec<String> {
     both.iter().filter_map(|role| Some(role.place()?.name().to_owned())).collect()
 }
 
-/// The drag areas of a round body, m², of which that much leans the vehicle by so much, rad/(m/s)².
-fn of_body((body, per_m2): (Body, f64)) -> Option<Vec<Fitted>> {
+/// The drag areas, m², of a body that leans the vehicle by so much more than its own does, where each of its sides leans it by so
+/// much, rad/(m/s)²: a round one, or the vehicle's own, as much larger from above as from the side.
+fn of_body((body, per_m2): (Body, f64), vehicle: &Vehicle) -> Option<Vec<Fitted>> {
     let half = HALF * body.square_se;
-    let area = |square: f64| (square / per_m2).max(0.0);
+    (per_m2 > 0.0 && half.is_finite()).then_some(())?;
+    let sides_m2 = Role::BodyDragSide.value(vehicle).filter(|area| *area > 0.0);
     let one = |role: Role| {
         let parameter = role.place()?.parameter;
+        let before = role.value(vehicle);
+        let area = |square: f64| {
+            let more_m2 = square / per_m2;
+            let area_m2 = match (before, sides_m2) {
+                (Some(own_m2), Some(sides_m2)) => own_m2 * (1.0 + more_m2 / sides_m2),
+                _ => more_m2,
+            };
+            area_m2.clamp(0.0, parameter.high)
+        };
         Some(Fitted {
             name: parameter.name.to_owned(),
             unit: parameter.unit.to_owned(),
@@ -133,10 +155,9 @@ fn of_body((body, per_m2): (Body, f64)) -> Option<Vec<Fitted>> {
                 low: area(body.square - half),
                 high: area(body.square + half),
             },
-            before: None,
+            before,
         })
     };
-    (per_m2 > 0.0 && half.is_finite()).then_some(())?;
     [Role::BodyDragTop, Role::BodyDragSide].into_iter().map(one).collect()
 }
 
@@ -158,11 +179,31 @@ mod tests {
     #[test]
     fn areas_of_a_round_body_are_alike_and_never_negative() {
         let body = Body { square: 0.002, square_se: 0.0012, better_nats: 9.0 };
-        let found = of_body((body, 0.05)).unwrap();
+        let mut vehicle = trial::vehicle();
+        vehicle.effects.clear();
+        let found = of_body((body, 0.05), &vehicle).unwrap();
         assert_eq!(found[0].value, found[1].value);
         let Interval { value, low, high } = found[0].value;
         assert!((value - 0.04).abs() < 1e-12 && low == 0.0 && (high - 0.088).abs() < 1e-12);
-        assert!(of_body((Body { square_se: f64::INFINITY, ..body }, 0.05)).is_none());
+        assert!(of_body((Body { square_se: f64::INFINITY, ..body }, 0.05), &vehicle).is_none());
+        // One that the model has is as much larger from above.
+        Role::BodyDragTop.set(&mut vehicle, 0.03);
+        Role::BodyDragSide.set(&mut vehicle, 0.02);
+        let found = of_body((body, 0.05), &vehicle).unwrap();
+        let areas = [found[0].value.value, found[1].value.value];
+        assert!((areas[0] - 0.09).abs() < 1e-12 && (areas[1] - 0.06).abs() < 1e-12, "{areas:?}");
+        assert_eq!((found[0].before, found[1].before), (Some(0.03), Some(0.02)));
+    }
+
+    #[test]
+    fn a_body_is_told_by_itself_where_it_is_plain() {
+        let body = |square: f64, square_se: f64, better_nats: f64| {
+            is_told(&Body { square, square_se, better_nats })
+        };
+        assert!(body(0.002, 0.0003, 12.1));
+        assert!(!body(0.002, 0.0003, 11.9), "rotors explain nearly as much");
+        assert!(!body(0.002, 0.0005, 20.0), "four standard errors");
+        assert!(!body(0.0009, 0.0001, 20.0), "nobody would notice");
     }
 
     #[test]

@@ -122,6 +122,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let answered = |repaired: &Vehicle| {
         let mut repaired = repaired.clone();
         add_others(&mut repaired, leans.as_slice());
+        add_bodies(&mut repaired, leans.as_slice());
         let question = Question {
             original: vehicle,
             repaired: &repaired,
@@ -211,6 +212,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     verdict.summary = summary(&verdict);
     let mut model = model(vehicle, &found);
     add_others(&mut model, &verdict.steps);
+    if !Role::BodyDragTop.is_on(&found.vehicle) {
+        add_bodies(&mut model, &verdict.steps);
+    }
     if verdict.sensor.named && !verdict.sensor.in_log {
         model = self::repaired(&model, &verdict.sensor);
     }
@@ -318,6 +322,28 @@ fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
     vehicle
 }
 
+/// The body that the leans told, until the pulse tells its top.
+fn add_bodies(model: &mut Vehicle, steps: &[Step]) {
+    let mut areas = Vec::new();
+    for step in steps {
+        let (Some(first), Finding::Class { parameters, .. }) =
+            (step.finding.effects().first().copied(), &step.finding)
+        else {
+            continue;
+        };
+        for role in [Role::BodyDragTop, Role::BodyDragSide] {
+            let is_it = |one: &&Fitted| {
+                role.place()
+                    .is_some_and(|place| place.name() == first && place.parameter.name == one.name)
+            };
+            areas.extend(parameters.iter().find(is_it).map(|area| (role, area.value.value)));
+        }
+    }
+    for (role, area_m2) in areas {
+        role.set(model, area_m2);
+    }
+}
+
 /// Tells an effect as new that the model got from the leans before the pulse was searched.
 fn as_new(steps: &mut [Step], effect: &str) {
     for step in steps {
@@ -342,29 +368,12 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
         else {
             continue;
         };
-        let mut areas = Vec::new();
         for role in [Role::RotorDrag, Role::MassSpread, Role::ThrustSpread] {
             if let Some(place) = role.place().filter(|place| place.name() == *first)
                 && let Some(size) = parameters.first()
             {
                 role.set(model, size.value.value.min(place.parameter.high));
             }
-        }
-        // A body that the leans told is a round one, until the pulse tells its top.
-        if !Role::BodyDragTop.is_on(model) {
-            for role in [Role::BodyDragTop, Role::BodyDragSide] {
-                let is_it = |one: &&Fitted| {
-                    role.place().is_some_and(|place| {
-                        place.name() == *first && place.parameter.name == one.name
-                    })
-                };
-                if let Some(area) = parameters.iter().find(is_it) {
-                    areas.push((role, area.value.value));
-                }
-            }
-        }
-        for (role, area_m2) in areas {
-            role.set(model, area_m2);
         }
     }
 }
@@ -390,13 +399,9 @@ mod tests {
         let told = trial::step(Finding::Class { effects, parameters }, 20.0, &[]);
         let mut model = trial::vehicle();
         model.effects.clear();
-        add_others(&mut model, std::slice::from_ref(&told));
+        add_bodies(&mut model, &[told]);
         let areas = [Role::BodyDragTop, Role::BodyDragSide].map(|role| role.value(&model));
         assert_eq!(areas, [Some(0.03), Some(0.03)]);
-        // A body that the pulse was fitted with stays.
-        Role::BodyDragTop.set(&mut model, 0.02);
-        add_others(&mut model, &[told]);
-        assert_eq!(Role::BodyDragTop.value(&model), Some(0.02));
         let before = Fitted { before: Some(0.03), ..area("vertical_m2", 0.02) };
         let again = Finding::Name {
             effect: "parasitic-drag".to_owned(),
