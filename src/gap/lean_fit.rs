@@ -98,7 +98,7 @@ enum Lacks {
 /// A round body that the model lacks, by legs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Body {
-    /// Its part of the lean, rad/(m/s)².
+    /// Part of the lean that it adds, rad/(m/s)².
     pub square: f64,
     /// Standard error of that.
     pub square_se: f64,
