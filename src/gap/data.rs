@@ -477,7 +477,9 @@ mod tests {
             one.current_a = None;
         }
         assert_eq!(loaded(&logs).unwrap().flown_a, None);
-        logs.iter_mut().for_each(|one| one.resistance_ohm = Some(1.5));
+        for one in &mut logs {
+            one.resistance_ohm = Some(1.5);
+        }
         assert!(loaded(&logs).is_none());
     }
 

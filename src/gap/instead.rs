@@ -358,7 +358,7 @@ mod tests {
         for effect in ["parasitic-drag", "thrust-curve", "vortex-ring", "face-drag"] {
             assert!(all.contains(&effect), "{effect}");
         }
-        assert!(!all.contains(&"battery") && !all.contains(&"turbulence"));
+        assert!(!all.contains(&"motor-thermal") && !all.contains(&"turbulence"));
         assert_eq!(rivals(&[unknown(Dependence::Height)]), ["rotor-inflow"]);
         let instead = |nats: f64| {
             let mut there = ended(0.0, &[]);
