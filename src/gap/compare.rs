@@ -445,7 +445,8 @@ impl Comparison {
     /// A round body that the model lacks, by the leans of horizontal legs, and by how much its drag area (m²) leans the
     /// vehicle, rad/(m/s)²; `None`: there are no legs.
     pub(super) fn body_told(&self) -> Option<(Body, f64)> {
-        let told = lean::body(&self.data, self.read_by, (&self.side, self.flown_mps))?;
+        let measured = self.wind.measured.as_ref()?;
+        let told = lean::body(&self.data, self.read_by, (&self.side, self.flown_mps), measured)?;
         let mut larger = self.vehicle.clone();
         let sides_m2 = Role::BodyDragSide.value(&larger).unwrap_or_default();
         Role::BodyDragSide.set(&mut larger, sides_m2 + 1.0);

@@ -227,6 +227,7 @@ fn left_with(
 #[cfg(test)]
 mod tests {
     use super::super::candidates::{Candidate, Felt, Size, Variant};
+    use super::super::explain::Only;
     use super::super::gls::{Pulses, Split};
     use super::super::noise::{GroupPattern, Hyper};
     use super::super::trial::{patterns, pulses, ranked};
@@ -430,10 +431,7 @@ mod tests {
     #[test]
     fn who_is_held_against_others_needs_half_of_what_finds_it() {
         let case = case();
-        let alone = Options {
-            only: Some(super::super::explain::Only { effect: "one", updraft_mps: 0.0 }),
-            ..BY_FLOORS
-        };
+        let alone = Options { only: Some(Only { effect: "one", updraft_mps: 0.0 }), ..BY_FLOORS };
         let is_taken = |gain| {
             let decision = case.decision(&[ranked(0, gain)], &[], &alone);
             matches!(decision.what, What::Effects { .. })

@@ -1,12 +1,13 @@
 //! Difficulty of finding an effect that is known to be there.
 
+use super::candidates::set;
 use super::compare::{Comparison, Simulated, thrust_exponent};
 use super::data::Data;
 use super::error::GapError;
 use super::gls::Column;
 use super::make::Input;
 use super::refine::{Parameter, size_of, slopes, trace_errors};
-use crate::effects::select::{set, value_of};
+use crate::effects::select::value_of;
 use crate::effects::{EffectError, Signals};
 use crate::vehicle::Vehicle;
 
@@ -109,6 +110,7 @@ fn column(comparison: &Comparison, pulse_us: &SteadyPulse<'_>) -> Column {
 mod tests {
     use super::super::trial;
     use super::*;
+    use crate::effects::Role;
 
     /// The trace of an effect is the difference of flights with and without it, however it bends on the way.
     #[test]
@@ -128,6 +130,19 @@ mod tests {
             assert!((found - expected).abs() < 1e-9, "{bin}: {found} {expected}");
         }
         assert!(trace.range() > 1.0, "{}", trace.range());
+        // A body that was smaller was so from all sides: leans, by which the wind is read, knew it.
+        let size = size_of("parasitic-drag", "vertical_m2").unwrap();
+        let mut comparison = comparison;
+        comparison.scene.blow(0, 5.0);
+        let mut vehicle = trial::vehicle();
+        set(&mut vehicle, "parasitic-drag", "vertical_m2", 0.04);
+        let whole = of_effect(&comparison, &vehicle, &size, 0.02).unwrap();
+        let mut half = vehicle.clone();
+        set(&mut half, "parasitic-drag", "vertical_m2", 0.02);
+        let sides = [&half, &vehicle].map(|one| Role::BodyDragSide.value(one).unwrap());
+        assert!((2.0 * sides[0] - sides[1]).abs() < 1e-9, "{sides:?}");
+        let expected = comparison.change(&half, &vehicle).unwrap();
+        assert!((whole.at(0, 0, 0) - expected.at(0, 0, 0)).abs() < 1e-12);
         // An effect whose size may not be zero is not there at all.
         let size = size_of("ground-effect", "radius_m").unwrap();
         let mut vehicle = trial::vehicle();

@@ -154,11 +154,6 @@ impl LeanLaw {
         self.square * self.body_share
     }
 
-    /// The same with another quadratic part, rad/(m/s)².
-    pub(super) fn with_square(self, square: f64) -> Self {
-        Self { square, ..self }
-    }
-
     /// The same with the drag of a round body besides, rad/(m/s)².
     pub(super) fn with_body(self, more: f64) -> Self {
         let square = (self.square + more).max(1e-9);
@@ -284,6 +279,8 @@ pub struct Measured {
     pub law: LeanLaw,
     /// Standard error of the law's linear part, rad/(m/s).
     pub linear_se: f64,
+    /// Minus the logarithm of its posterior density, but for a constant, nats.
+    pub misfit_nats: f64,
 }
 
 /// Finds the wind. Horizontal legs at known speeds measure the lean law as well.
@@ -327,7 +324,8 @@ pub(super) fn wind_by(
         legs.mean_se_mps.hypot(LEGS_DOUBT * speed_mps).min(LAW_DOUBT * speed_mps)
     });
     let mean_se_mps = LEAST_DOUBT_MPS.hypot(law_mps);
-    let measured = legs.map(|legs| Measured { law, linear_se: legs.linear_se });
+    let measured =
+        legs.map(|legs| Measured { law, linear_se: legs.linear_se, misfit_nats: legs.misfit_nats });
     Wind { mean_mps, mean_se_mps, air_mps, measured }
 }
 
@@ -390,14 +388,16 @@ fn moves(points: &[Point]) -> bool {
     points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING
 }
 
-/// A round body that the model lacks, by legs; `None`: there are none. `flown` is as in [`wind`].
+/// A round body that the model lacks, by the legs that measured a law from the model's; `None`: there are none. `flown` is as
+/// in [`wind`].
 pub(super) fn body(
     data: &Data,
     law: LeanLaw,
     flown: (&[Vec<BinValues>], [f64; 3]),
+    measured: &Measured,
 ) -> Option<Body> {
     let points = points(data, &settled_leans(data, law, Some(flown)));
-    moves(&points).then(|| fit_body(points, law))
+    moves(&points).then(|| fit_body(points, law, measured.misfit_nats))
 }
 
 /// The mean of the wind with the law of the lean that it was read by.

@@ -1,5 +1,5 @@
-//! The lean as a channel of its own: the lean of a drone at known speeds over ground tells its
-//! rotors' drag, whatever the pulse tells.
+//! The lean as a channel of its own: the lean of a drone at known speeds over ground tells the drag of its
+//! rotors and its body, whatever the pulse tells.
 
 use super::compare::Comparison;
 use super::decide::CLASS_NATS;
@@ -212,7 +212,7 @@ mod tests {
         let model = LeanLaw::of(&comparison.vehicle, SEA_LEVEL_DENSITY, 0.0);
         let mut told = |more: f64, linear_se: f64| {
             let law = LeanLaw { linear: model.linear + more, ..model };
-            comparison.wind.measured = Some(Measured { law, linear_se });
+            comparison.wind.measured = Some(Measured { law, linear_se, misfit_nats: 0.0 });
             let step = step(&comparison, &found(&comparison), 0.005)?;
             Some(step.finding.effects().join(" "))
         };

@@ -117,13 +117,16 @@ pub(super) struct Fitted {
     pub mean_mps: [f64; 2],
     /// Standard error of it along either axis, m/s.
     pub mean_se_mps: f64,
+    /// Minus the logarithm of the posterior density, but for a constant, nats.
+    pub misfit_nats: f64,
 }
 
 /// Fits the law from the model's. The search starts from the model's own linear part and from what small
 /// rotors usually have: with too small a one the wind begins far too strong.
 pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
     let points = in_order(points);
-    let (at, _) = most_probable(&points, model, Lacks::Rotors);
+    let model = usable(model);
+    let (at, misfit_nats) = most_probable(&points, model, Lacks::Rotors);
     let found = Candidate::of(&at, model, Lacks::Rotors);
     // A wall is no knowledge: what is against it may be anything behind it.
     let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Rotors));
@@ -132,21 +135,20 @@ pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
         linear_se: UNITS[DRAG] * errors[DRAG],
         mean_mps: found.mean_mps,
         mean_se_mps: errors[0].hypot(errors[1]) / std::f64::consts::SQRT_2,
+        misfit_nats,
     }
 }
 
-/// Fits a round body in place of a drag of the rotors.
-pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw) -> Body {
+/// Fits a round body in place of a drag of the rotors, which was fitted to the same leans with this misfit, nats.
+pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw, of_rotors_nats: f64) -> Body {
     let points = in_order(points);
-    let ((at, least), (_, of_rotors)) = rayon::join(
-        || most_probable(&points, model, Lacks::Body),
-        || most_probable(&points, model, Lacks::Rotors),
-    );
+    let model = usable(model);
+    let (at, misfit_nats) = most_probable(&points, model, Lacks::Body);
     let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Body));
     Body {
         square: BODY_UNIT * at[DRAG],
         square_se: BODY_UNIT * errors[DRAG],
-        better_nats: of_rotors - least,
+        better_nats: of_rotors_nats - misfit_nats,
     }
 }
 
@@ -155,9 +157,13 @@ fn in_order(mut points: Vec<Point>) -> Vec<Point> {
     points
 }
 
+/// A model's law with both parts, as numbers that a search can begin with.
+fn usable(model: LeanLaw) -> LeanLaw {
+    LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model }
+}
+
 /// The most probable variables and their misfit.
 fn most_probable(points: &[Point], model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
-    let model = LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model };
     let objective = |at: &[f64; COUNT]| misfit(points, at, model, lacks) + wall(at, lacks);
     let search = |drag: &f64| {
         let mut start =
@@ -204,7 +210,7 @@ impl Candidate {
         let square = at[SQUARE] * UNITS[SQUARE];
         let law = match lacks {
             Lacks::Rotors => LeanLaw { linear: at[DRAG] * UNITS[DRAG], square, ..model },
-            Lacks::Body => model.with_square(square).with_body(at[DRAG] * BODY_UNIT),
+            Lacks::Body => LeanLaw { square, ..model }.with_body(at[DRAG] * BODY_UNIT),
         };
         Self {
             mean_mps: [at[0], at[1]],
@@ -247,10 +253,10 @@ fn misfit(points: &[Point], at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> 
     let (log_det, chi2) = log_det_and_chi2(&[gust, gust, shear], &seen, &off);
     let square = |value: f64| value * value;
     let drag = match lacks {
-        Lacks::Rotors => (of.law.linear - model.linear.max(1e-4)) / LINEAR_DOUBT,
+        Lacks::Rotors => (of.law.linear - model.linear) / LINEAR_DOUBT,
         Lacks::Body => at[DRAG] * BODY_UNIT / BODY_DOUBT,
     };
-    let known = square((of.square.max(1e-7) / model.square.max(1e-5)).ln() / SQUARE_DOUBT)
+    let known = square((of.square.max(1e-7) / model.square).ln() / SQUARE_DOUBT)
         + square(drag)
         + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
         + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln());
@@ -342,14 +348,18 @@ mod tests {
     #[test]
     fn a_round_body_is_told_from_a_drag_of_the_rotors() {
         let more = 0.003;
-        let body = fit_body(flown(law().with_body(more), 0.14), law());
+        let told = |flown: Vec<Point>| {
+            let of_rotors = fit(flown.clone(), law());
+            fit_body(flown, law(), of_rotors.misfit_nats)
+        };
+        let body = told(flown(law().with_body(more), 0.14));
         assert!(body.better_nats > 10.0, "{body:?}");
         assert!((body.square - more).abs() < 3.0 * body.square_se, "{body:?}");
         assert!(body.square_se < 0.2 * more, "{body:?}");
         let rotors = LeanLaw { linear: law().linear + 0.02, ..law() };
-        let body = fit_body(flown(rotors, 0.14), law());
+        let body = told(flown(rotors, 0.14));
         assert!(body.better_nats < -10.0, "{body:?}");
-        let body = fit_body(flown(law(), 0.14), law());
+        let body = told(flown(law(), 0.14));
         assert!(body.better_nats.abs() < 6.0, "nothing is missing: {body:?}");
     }
 

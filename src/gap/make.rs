@@ -210,11 +210,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
-    let mut model = model(vehicle, &found);
-    add_others(&mut model, &verdict.steps);
-    if !Role::BodyDragTop.is_on(&found.vehicle) {
-        add_bodies(&mut model, &verdict.steps);
-    }
+    let mut model = model(vehicle, &found, &verdict.steps);
     if verdict.sensor.named && !verdict.sensor.in_log {
         model = self::repaired(&model, &verdict.sensor);
     }
@@ -272,7 +268,7 @@ fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
 }
 
 /// The vehicle file with what was found; what makes drones differ stays as it was.
-fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
+fn model(vehicle: &Vehicle, found: &Found, steps: &[Step]) -> Vehicle {
     let mut model = vehicle.clone();
     for parameter in &found.parameters {
         let Some(table) = found.vehicle.effects.get(parameter.effect) else { continue };
@@ -293,6 +289,10 @@ fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
         let names: Vec<&str> = found.parameters.iter().map(|parameter| parameter.effect).collect();
         model.source =
             format!("{}; {} found in measured flights", vehicle.source, names.join(", "));
+    }
+    add_others(&mut model, steps);
+    if !found.parameters.iter().any(|one| Role::BodyDragTop.is_of(one.effect)) {
+        add_bodies(&mut model, steps);
     }
     model
 }
@@ -324,7 +324,6 @@ fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
 
 /// The body that the leans told, until the pulse tells its top.
 fn add_bodies(model: &mut Vehicle, steps: &[Step]) {
-    let mut areas = Vec::new();
     for step in steps {
         let (Some(first), Finding::Class { parameters, .. }) =
             (step.finding.effects().first().copied(), &step.finding)
@@ -336,21 +335,25 @@ fn add_bodies(model: &mut Vehicle, steps: &[Step]) {
                 role.place()
                     .is_some_and(|place| place.name() == first && place.parameter.name == one.name)
             };
-            areas.extend(parameters.iter().find(is_it).map(|area| (role, area.value.value)));
+            if let Some(area) = parameters.iter().find(is_it) {
+                role.set(model, area.value.value);
+            }
         }
-    }
-    for (role, area_m2) in areas {
-        role.set(model, area_m2);
     }
 }
 
 /// Tells an effect as new that the model got from the leans before the pulse was searched.
 fn as_new(steps: &mut [Step], effect: &str) {
     for step in steps {
-        if let Finding::Name { effect: name, parameters, was_there } = &mut step.finding
-            && name == effect
-        {
+        if step.finding.effects().first() != Some(&effect) {
+            continue;
+        }
+        if let Finding::Name { was_there, .. } = &mut step.finding {
             *was_there = false;
+        }
+        if let Finding::Name { parameters, .. } | Finding::Class { parameters, .. } =
+            &mut step.finding
+        {
             for one in parameters {
                 one.before = None;
             }
@@ -399,19 +402,34 @@ mod tests {
         let told = trial::step(Finding::Class { effects, parameters }, 20.0, &[]);
         let mut model = trial::vehicle();
         model.effects.clear();
-        add_bodies(&mut model, &[told]);
-        let areas = [Role::BodyDragTop, Role::BodyDragSide].map(|role| role.value(&model));
-        assert_eq!(areas, [Some(0.03), Some(0.03)]);
+        let areas =
+            |model: &Vehicle| [Role::BodyDragTop, Role::BodyDragSide].map(|role| role.value(model));
+        let known = model.clone();
+        add_bodies(&mut model, std::slice::from_ref(&told));
+        assert_eq!(areas(&model), [Some(0.03), Some(0.03)]);
+        // The model that is written has it though the pulse told nothing of it.
+        let mut found = Found::nothing(trial::comparison(&trial::data(2, |_, _| 0.0)));
+        found.vehicle = model;
+        let steps = [told];
+        assert_eq!(areas(&super::model(&known, &found, &steps)), [Some(0.03), Some(0.03)]);
+        // What the pulse was fitted with stays.
+        found.parameters.extend(crate::gap::refine::size_of("parasitic-drag", "vertical_m2"));
+        Role::BodyDragTop.set(&mut found.vehicle, 0.02);
+        assert_eq!(areas(&super::model(&known, &found, &steps)), [Some(0.02), Some(0.03)]);
         let before = Fitted { before: Some(0.03), ..area("vertical_m2", 0.02) };
         let again = Finding::Name {
             effect: "parasitic-drag".to_owned(),
-            parameters: vec![before],
+            parameters: vec![before.clone()],
             was_there: true,
         };
-        let mut steps = vec![trial::step(again, 20.0, &[])];
+        let effects = vec!["parasitic-drag".to_owned(), "thrust-curve".to_owned()];
+        let class = Finding::Class { effects, parameters: vec![before] };
+        let mut steps = [again, class].map(|finding| trial::step(finding, 20.0, &[]));
         as_new(&mut steps, "parasitic-drag");
         let Finding::Name { parameters, was_there, .. } = &steps[0].finding else { panic!() };
         assert!(!was_there && parameters[0].before.is_none());
+        let Finding::Class { parameters, .. } = &steps[1].finding else { panic!() };
+        assert!(parameters[0].before.is_none());
     }
 
     /// Logs of a small fleet that flies as its model says, and what the held-out drones have more in their

@@ -435,7 +435,7 @@ mod tests {
             let law = lean_law(&found.comparison.vehicle, 0.0, 0.0);
             let wind = &mut found.comparison.wind;
             wind.mean_mps = wind_mps;
-            wind.measured = measured.then_some(Measured { law, linear_se: 1e-3 });
+            wind.measured = measured.then_some(Measured { law, linear_se: 1e-3, misfit_nats: 0.0 });
             found.steps = vec![step(name(effect), 118.0, 19.0, &[])];
             beside_drag_of_the_body(&mut found);
             told(&found.steps).concat()

@@ -128,11 +128,10 @@ pub(super) fn samples<T: Send>(
     let mut drawn: Vec<Drawn<T>> = Vec::new();
     let mut proposals: Vec<Proposal<'_>> = Vec::new();
     for round in 0..MOST_ROUNDS {
-        let weights: Vec<f64> = drawn.iter().map(|one| one.weight).collect();
-        let Some(wider) = WIDER.get(round).or(WIDER.last()).copied() else { break };
-        if round >= WIDER.len() && effective(&weights) > COUNT {
+        if round >= WIDER.len() && effective(&weights_of(&drawn)) > COUNT {
             break;
         }
+        let wider = WIDER[round.min(WIDER.len() - 1)];
         let shape = if round == 0 { Some(Shape::Split(found)) } else { next(&drawn, found) };
         proposals.extend(shape.map(|shape| Proposal { shape, wider }));
         let Some(proposal) = proposals.last() else { break };
@@ -202,6 +201,10 @@ fn next<'a, T>(drawn: &[Drawn<T>], found: &Found) -> Option<Shape<'a>> {
     Some(Shape::Normal(Box::new(Normal { mean, factor: covariance.cholesky()? })))
 }
 
+fn weights_of<T>(drawn: &[Drawn<T>]) -> Vec<f64> {
+    drawn.iter().map(|one| one.weight).collect()
+}
+
 /// How many independent points weights are worth.
 fn effective(weights: &[f64]) -> f64 {
     1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>().max(f64::MIN_POSITIVE)
@@ -248,7 +251,7 @@ mod tests {
             -0.5 * ((along - 0.5) / 1.0_f64).powi(2) - 0.5 * (across / 0.25_f64).powi(2) - rest
         };
         let drawn = samples(&found, |point| Some((ln_posterior(point), ()))).drawn;
-        let weights: Vec<f64> = drawn.iter().map(|one| one.weight).collect();
+        let weights = weights_of(&drawn);
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         assert!(effective(&weights) > 25.0, "{}", effective(&weights));
         let along = |one: &Drawn<()>| 0.6 * one.point[0] + 0.8 * one.point[1];
@@ -256,5 +259,28 @@ mod tests {
         let variance: f64 = drawn.iter().map(|one| one.weight * (along(one) - mean).powi(2)).sum();
         assert!((mean - 0.5).abs() < 0.3, "{mean}");
         assert!((variance.sqrt() - 1.0).abs() < 0.25, "{}", variance.sqrt());
+    }
+
+    #[test]
+    fn rounds_go_on_until_enough_points_count_and_none_counts_for_too_much() {
+        let found = Found::guess(Form::Exponential, [0.0; SCALES], &SMatrix::identity());
+        let drawn = |sd: f64| {
+            let ln_posterior =
+                |point: &Point| -0.5 * SVector::from(*point).norm_squared() / (sd * sd);
+            samples(&found, |point| Some((ln_posterior(point), ()))).drawn
+        };
+        // A guess that is right, and one that is four times too wide in each of ten directions.
+        let (right, wide) = (drawn(1.0), drawn(0.25));
+        assert!(effective(&weights_of(&right)) > COUNT);
+        assert!(wide.len() > right.len(), "{} and {}", wide.len(), right.len());
+        assert!(wide.len() <= MOST_ROUNDS * POINTS);
+        let one =
+            |ln_posterior| Drawn { point: [0.0; SCALES], weight: 0.0, kept: (), ln_posterior };
+        let mut drawn = vec![one(-5.0); 100];
+        drawn[0] = one(0.0);
+        reweigh(&mut drawn, &[Proposal { shape: Shape::Split(&found), wider: 1.0 }]);
+        // It would have 0.6 of the weight; a tenth of what there was is left of it, of 0.83.
+        assert!((drawn[0].weight - 0.2).abs() < 0.01, "{}", drawn[0].weight);
+        assert!((weights_of(&drawn).iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 }
