@@ -431,7 +431,10 @@ mod tests {
     #[test]
     fn who_is_held_against_others_needs_half_of_what_finds_it() {
         let case = case();
-        let alone = Options { only: Some(Only { effect: "one", updraft_mps: 0.0 }), ..BY_FLOORS };
+        let alone = Options {
+            only: Some(Only { effect: "one", updraft_mps: 0.0, beaten_nats: 0.0 }),
+            ..BY_FLOORS
+        };
         let is_taken = |gain| {
             let decision = case.decision(&[ranked(0, gain)], &[], &alone);
             matches!(decision.what, What::Effects { .. })

@@ -22,7 +22,7 @@ use super::lean::LEGS_DOUBT;
 use super::model_flights::ModelFlights;
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
-use super::response::{self, Response, gusts_mps};
+use super::response::{self, Response, gusts_mps, settled};
 use super::search::{
     FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, round, told_of,
 };
@@ -62,6 +62,8 @@ pub struct Only {
     pub effect: &'static str,
     /// An updraft to look in beside the usual ones, m/s.
     pub updraft_mps: f64,
+    /// How well the flight is explained without, nats.
+    pub beaten_nats: f64,
 }
 
 impl Default for Options {
@@ -157,7 +159,9 @@ impl Found {
         let doubts = refine::doubts(comparison, vehicle, &self.parameters)?;
         let known = doubts.get(1..).unwrap_or_default();
         let problem = Problem::new(&patterns, &residual).doubting(known).with(&self.extras);
-        let likely = problem.fit(self.hyper, Likelihood::Profile).log_posterior();
+        let first = problem.fit(self.hyper, Likelihood::Profile);
+        // At the speed relative to the air that all share, as in the rounds that found it.
+        let likely = settled(&problem, first, |_| patterns.clone()).1.log_posterior();
         let price = |step: &Step| match step.finding {
             Finding::Unknown { .. } => FREE_FLOOR_NATS,
             Finding::Name { .. } | Finding::Class { .. } => FLOOR_NATS,

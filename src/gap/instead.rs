@@ -59,7 +59,7 @@ pub(super) fn fewer_instead(
     };
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let alone = rivals(&found.steps);
-    let updraft_mps = found.updraft_mps;
+    let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
     let by = |only: Only| Options {
         only: Some(only),
         most_steps: 1,
@@ -67,11 +67,10 @@ pub(super) fn fewer_instead(
         rest: false,
         ..*options
     };
-    let alone = alone.into_iter().map(|effect| by(Only { effect, updraft_mps }));
+    let alone = alone.into_iter().map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats }));
     let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
-    let nats = found.explains()?;
     let Decided { ended, names } = decided(Ended { found, nats, only: None }, others);
     let mut found = match ended.only {
         // What is left beside it is sought only now.

@@ -17,7 +17,7 @@ const WORSE: f64 = 1.01;
 
 /// What explains so much less is no other view of the flight, nats, whatever it does to the raw gap, which has the air in
 /// it. Chosen: more than wrong readings of the air have cost.
-const FAR_NATS: f64 = 100.0;
+pub(super) const FAR_NATS: f64 = 100.0;
 
 /// What is searched for, and in what.
 #[derive(Clone, Copy)]

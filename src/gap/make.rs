@@ -112,9 +112,13 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(vehicle, &channel);
     if channel.named {
-        // What is late may be the log alone: then the model must not be made late.
-        let late = Comparison::new(&data, &repaired, &simulated, input.plan)?;
-        if late.raw_gap_us()? > before.raw_gap_us()? {
+        // What is late may be the log alone: then the model must not be made late. So it is where no drone could have flown
+        // the plan with such an error in its loop.
+        let is_nearer = match Comparison::new(&data, &repaired, &simulated, input.plan) {
+            Err(error) if error.is_not_flown() => false,
+            late => late?.raw_gap_us()? <= before.raw_gap_us()?,
+        };
+        if !is_nearer {
             channel.in_log = true;
             repaired = vehicle.clone();
         }
@@ -133,7 +137,13 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         };
         question.answered(&train, &held)
     };
-    let (mut found, mut shrink) = answered(&repaired)?;
+    let (mut found, mut shrink) = match answered(&repaired) {
+        Err(error) if error.is_not_flown() && channel.named && !channel.in_log => {
+            channel.in_log = true;
+            answered(vehicle)?
+        }
+        answered => answered?,
+    };
     if is_only_in_log(&channel, &shrink) {
         channel.in_log = true;
         (found, shrink) = answered(vehicle)?;

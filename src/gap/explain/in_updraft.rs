@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use super::super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::super::error::GapError;
 use super::super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::super::kept::FAR_NATS;
 use super::super::noise::{GroupPattern, Hyper};
-use super::super::refine;
-use super::super::response::gusts_mps;
+use super::super::refine::{self, slopes};
+use super::super::response::{gusts_mps, settled};
 use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
 use super::{Found, In, Look, MOST_GUSTS_MPS, Only, Search};
 
@@ -46,15 +47,14 @@ impl Search<'_> {
     /// What is left in the updraft that explains most, or in still air with the effect that explains most: what
     /// a model lacks can look like an updraft, and the other way round.
     pub(super) fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
-        let begins = self.found.steps.is_empty();
+        if !self.found.steps.is_empty() {
+            return self.look_in_updraft_of_findings();
+        }
         let look = self.look(In::Settled)?;
         if self.found.updraft_mps.abs() < STILL_MPS {
             return Ok(look);
         }
         self.found.was_in_updraft = true;
-        if !begins {
-            return Ok(look);
-        }
         let there = (self.comparison.clone(), self.found.clone());
         self.found.updraft_mps = 0.0;
         self.comparison = self.against_model()?;
@@ -69,6 +69,45 @@ impl Search<'_> {
         }
         (self.comparison, self.found) = there;
         Ok(look)
+    }
+
+    /// What is left in the updraft that explains most with what was found, if that, fitted there, explains more than
+    /// it did where it was found.
+    fn look_in_updraft_of_findings(&mut self) -> Result<Look, GapError> {
+        let before = (self.comparison.clone(), self.found.clone());
+        let look = self.look(In::Settled)?;
+        if self.found.updraft_mps == before.1.updraft_mps {
+            return Ok(look);
+        }
+        let is_more = self.is_fitted_here()? && self.found.explains()? > before.1.explains()?;
+        if is_more {
+            self.found.was_in_updraft |= self.found.updraft_mps.abs() >= STILL_MPS;
+        } else {
+            (self.comparison, self.found) = before;
+        }
+        self.look(In::Present(None))
+    }
+
+    /// Fits what was found in the present updraft, and flies the model there; whether it flies the same bins.
+    fn is_fitted_here(&mut self) -> Result<bool, GapError> {
+        let bins = self.found.comparison.data.bins_of_groups();
+        for is_refitted in [false, true] {
+            if is_refitted {
+                if self.found.parameters.is_empty() {
+                    break;
+                }
+                self.found.refit(&self.comparison)?;
+            }
+            match self.against_model() {
+                Err(error) if error.is_not_flown() => return Ok(false),
+                flown => self.comparison = flown?,
+            }
+            if self.comparison.data.bins_of_groups() != bins {
+                return Ok(false);
+            }
+        }
+        self.found.comparison = self.comparison.clone();
+        Ok(true)
     }
 
     /// What is left in the updraft in which the whole flight is likeliest, each flown by the model and with drones that
@@ -109,30 +148,62 @@ impl Search<'_> {
     /// Goes into the updraft in which the flight of the present model is likeliest, with sizes that are fitted there, if
     /// that explains more; whether it did. A size that was fitted in another updraft keeps the search there.
     pub(super) fn goes_where_it_is_likelier(&mut self, hyper: Hyper) -> Result<bool, GapError> {
-        let (mut went, mut hyper) = (false, hyper);
-        for steps_mps in [&FLIGHT_STEPS_MPS[..], &FLIGHT_STEPS_MPS[2..]] {
-            let start = [self.found.updraft_mps];
-            let Some((_, updraft_mps)) = self.likeliest_flight(hyper, &start, steps_mps) else {
-                break;
-            };
-            if updraft_mps == self.found.updraft_mps {
-                break;
-            }
-            let before = (self.comparison.clone(), self.found.clone());
-            self.found.updraft_mps = updraft_mps;
-            self.comparison = self.against_model()?;
-            self.found.refit(&self.comparison)?;
-            self.comparison = self.against_model()?;
-            self.found.comparison = self.comparison.clone();
-            let is_near = self.comparison.raw_gap_us()? < NEAR * before.0.raw_gap_us()?;
-            if !is_near || self.found.explains()? <= before.1.explains()? {
-                (self.comparison, self.found) = before;
-                break;
-            }
-            self.found.was_in_updraft = true;
-            (went, hyper) = (true, self.found.hyper);
+        let mut went = self.climbs()?;
+        let beaten_nats = self.options.only.map_or(f64::NEG_INFINITY, |only| only.beaten_nats);
+        if self.found.explains()? < beaten_nats - FAR_NATS {
+            return Ok(went);
+        }
+        let hyper = if went { self.found.hyper } else { hyper };
+        let start = [self.found.updraft_mps];
+        let Some((_, updraft_mps)) = self.likeliest_flight(hyper, &start, &FLIGHT_STEPS_MPS[..3])
+        else {
+            return Ok(went);
+        };
+        if updraft_mps != self.found.updraft_mps && self.goes_to(updraft_mps)? {
+            self.climbs()?;
+            went = true;
         }
         Ok(went)
+    }
+
+    /// Goes into the updrafts that the slopes lead to, with all sizes free, as long as that explains more; whether it went.
+    fn climbs(&mut self) -> Result<bool, GapError> {
+        let mut went = false;
+        for _ in 0..UPDRAFT_ROUNDS {
+            let Self { comparison, found, .. } = &*self;
+            let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+            let mut free = found.extras.clone();
+            free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
+            let at_mps = found.updraft_mps;
+            let Some(here) =
+                InUpdraft::fitted(comparison, &patterns, found, &free, found.hyper, at_mps)
+            else {
+                break;
+            };
+            let step_mps = (here.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+            if step_mps.abs() < UPDRAFT_SETTLED_MPS
+                || !(self.goes_to(at_mps + step_mps)? || self.goes_to(at_mps + 0.5 * step_mps)?)
+            {
+                break;
+            }
+            went = true;
+        }
+        Ok(went)
+    }
+
+    /// Goes into an updraft, with sizes that are fitted there, if that explains more; whether it did.
+    fn goes_to(&mut self, updraft_mps: f64) -> Result<bool, GapError> {
+        let before = (self.comparison.clone(), self.found.clone());
+        self.found.updraft_mps = updraft_mps;
+        let is_more = self.is_fitted_here()?
+            && self.comparison.raw_gap_us()? < NEAR * before.0.raw_gap_us()?
+            && self.found.explains()? > before.1.explains()?;
+        if is_more {
+            self.found.was_in_updraft = true;
+        } else {
+            (self.comparison, self.found) = before;
+        }
+        Ok(is_more)
     }
 
     /// How likely the flight of the present model is in the updraft in which it is likeliest, nats, and that updraft, m/s,
@@ -180,6 +251,7 @@ impl Search<'_> {
             let residual = Split::of(&there.residual(vehicle, gusts).ok()?);
             let problem = Problem::new(&patterns, &residual).doubting(known);
             let fit = problem.fit(hyper, Likelihood::Profile);
+            let fit = settled(&problem, fit, |_| patterns.clone()).1;
             likely = Some(fit.log_posterior());
             hyper = fit.hyper;
             gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);

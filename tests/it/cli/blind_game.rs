@@ -327,6 +327,18 @@ fn how_hard_it_was_to_see_is_told_of_the_air_that_was_flown_in() {
     assert!(in_still_air > 6.0 && in_sinking_air < 2.0, "{in_still_air} {in_sinking_air}");
 }
 
+/// With such an error in its control loop no drone could have flown the plan at all.
+#[test]
+fn a_velocity_that_is_far_off_is_told_as_an_error_of_the_log_alone() {
+    let bench = Bench::new();
+    let more = ["--vehicle", "pixel", "--effect", "log-bias=0.9", "--seed", "3", "-o", "game"];
+    hide(&bench, &[&FEW[..], &more].concat());
+    let told = bench.expect(0, &["gap", "game", "--json"]).json("updraft.gap/1");
+    assert_eq!(told["verdict"]["sensor"]["in_log"], true, "{}", told["verdict"]["sensor"]);
+    let revealed = bench.expect(0, &["blind", "reveal", "game", "--json"]);
+    assert_eq!(revealed.json("updraft.blind-record/1")["right"], true, "{revealed}");
+}
+
 /// The whole way, with the real search, which finds no truth: it was carried off.
 ///
 /// `cargo test --release --test it cli::blind_game -- --ignored`
