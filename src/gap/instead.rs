@@ -39,13 +39,15 @@ struct Decided {
 }
 
 /// What explains a flight best: what was found, one effect in its place, or nothing. Effects that explain it as well as a
-/// single finding are told as a class with it. `flown` searches with these options.
+/// single finding are told as a class with it. `flown` searches with these options; `by_leans` says whether leans alone
+/// told a drag of the rotors.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
 pub(super) fn fewer_instead(
     found: Found,
     options: &Options,
+    by_leans: bool,
     flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
 ) -> Result<Found, GapError> {
     let bins = found.comparison.data.bins_of_groups();
@@ -58,7 +60,7 @@ pub(super) fn fewer_instead(
         is_alike.then_some(Ended { found, nats, only })
     };
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
-    let alone = rivals(&found.steps);
+    let alone = rivals(&found.steps, by_leans);
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
     let by = |only: Only| Options {
         only: Some(only),
@@ -84,7 +86,7 @@ pub(super) fn fewer_instead(
 }
 
 /// Effects of the library that explained much where something was found, those that explained most first.
-fn rivals(steps: &[Step]) -> Vec<&'static str> {
+fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     // What was found alone has its turn as well, in the updraft in which it explains most.
     let lead = match steps {
         [step] => step.finding.effects().first().and_then(|name| find(name)),
@@ -127,7 +129,7 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
         steps.len() > 1 && axial.iter().any(|role| role.is_of(name)) || Role::RotorDrag.is_of(name)
     };
     if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
-        && names.iter().any(is_asked)
+        && (by_leans || names.iter().any(is_asked))
         && !names.contains(&drag)
     {
         names.push(drag);
@@ -333,17 +335,20 @@ mod tests {
     fn who_explained_half_as_much_has_its_turn_and_what_was_found_too() {
         let rivals_of = |effect: &str| {
             let others = [("climb", 30.0), ("face-drag", 25.0), ("battery", 12.0)];
-            rivals(&[step(effect, 26.0, &others)])
+            rivals(&[step(effect, 26.0, &others)], false)
         };
         assert_eq!(rivals_of("thrust-curve"), ["face-drag", "thrust-curve"]);
         assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow"]);
         let inflow = [("rotor-inflow", 25.0)];
         let two = [step("thrust-curve", 26.0, &inflow), step("battery", 26.0, &[])];
-        assert_eq!(rivals(&two), ["rotor-inflow", "momentum-drag"], "no round looks for it");
+        assert_eq!(rivals(&two, false), ["rotor-inflow", "momentum-drag"], "no round looks for it");
         // So has a drag of the rotors that leans told, also beside a single name.
         let by_lean =
             [step("translational-lift/blade-flapping", 26.0, &[("blade-flapping", 24.0)])];
-        assert!(rivals(&by_lean).contains(&"momentum-drag"));
+        assert!(rivals(&by_lean, false).contains(&"momentum-drag"));
+        let inflow = [step("rotor-inflow", 26.0, &[])];
+        assert!(!rivals(&inflow, false).contains(&"momentum-drag"));
+        assert!(rivals(&inflow, true).contains(&"momentum-drag"), "leans told it, not this search");
     }
 
     #[test]
@@ -352,13 +357,13 @@ mod tests {
             let finding = Finding::Unknown { depends_on, formula: None };
             trial::step(finding, 60.0, &[("climb", 60.0), ("rotor-inflow", 40.0)])
         };
-        let all = rivals(&[unknown(Dependence::Climb)]);
+        let all = rivals(&[unknown(Dependence::Climb)], false);
         assert_eq!(all[0], "rotor-inflow", "the likeliest first");
         for effect in ["parasitic-drag", "thrust-curve", "vortex-ring", "face-drag"] {
             assert!(all.contains(&effect), "{effect}");
         }
         assert!(!all.contains(&"motor-thermal") && !all.contains(&"turbulence"));
-        assert_eq!(rivals(&[unknown(Dependence::Height)]), ["rotor-inflow"]);
+        assert_eq!(rivals(&[unknown(Dependence::Height)], false), ["rotor-inflow"]);
         let instead = |nats: f64| {
             let mut there = ended(0.0, &[]);
             there.found.steps = vec![unknown(Dependence::Climb)];

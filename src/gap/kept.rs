@@ -8,6 +8,7 @@ use super::heldout::Case;
 use super::instead::fewer_instead;
 use super::model_flights::ModelFlights;
 use super::verdict::{Finding, Gap, Step};
+use crate::effects::Role;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
@@ -78,7 +79,7 @@ impl Question<'_> {
         let before = found.steps.clone();
         if !found.steps.is_empty() {
             let flown = |options: &Options| self.search(train, options);
-            found = fewer_instead(found, self.options, flown)?;
+            found = fewer_instead(found, self.options, self.lacked_drag(), flown)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;
             }
@@ -89,6 +90,11 @@ impl Question<'_> {
         let found = self.withdrawn(train, found, &before)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
+    }
+
+    /// Whether the model has a drag of the rotors only because leans told it.
+    fn lacked_drag(self) -> bool {
+        Role::RotorDrag.is_on(self.repaired) && !Role::RotorDrag.is_on(self.original)
     }
 
     /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search; the model as it

@@ -507,7 +507,58 @@ const UPDRAFT_SETTLED_MPS: f64 = 0.01;
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::model_flights::ModelFlights;
+    use super::super::super::trial;
+    use super::super::Options;
     use super::*;
+    use crate::effects::{Model, Signals};
+
+    /// A search, begun on drones that flew in an updraft, with what it makes of it.
+    fn in_air<T>(updraft_mps: f64, of: impl FnOnce(&mut Search<'_>) -> T) -> (T, f64) {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let model = Model::of(&vehicle).unwrap();
+        let pulse_us = |climb_mps: f64| {
+            let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+            model.pulse_us(&Signals { climb_mps, ..here })
+        };
+        let data = trial::data(4, |drone, bin| {
+            let climb_mps = bin.climb_mps();
+            let ripple_us = 0.1 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+            pulse_us(climb_mps - updraft_mps) - pulse_us(climb_mps) + ripple_us
+        });
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let (options, flights) = (Options::default(), ModelFlights::default());
+        let mut search = Search {
+            data: &data,
+            vehicle: &vehicle,
+            lacked_drag: false,
+            simulated: &simulated,
+            plan: None,
+            options: &options,
+            flights: &flights,
+            found: Found::nothing(comparison.clone()),
+            comparison,
+            refused: Vec::new(),
+            last: None,
+        };
+        let made = of(&mut search);
+        (made, search.found.updraft_mps)
+    }
+
+    #[test]
+    fn an_updraft_is_gone_into_only_where_the_flight_is_explained_better_there() {
+        let goes = |to_mps: f64| in_air(1.0, |search| search.goes_to(to_mps).unwrap());
+        assert_eq!(goes(1.0), (true, 1.0));
+        assert_eq!(goes(-1.0), (false, 0.0), "and otherwise everything is as before");
+    }
+
+    #[test]
+    fn slopes_lead_to_the_updraft_of_the_flight() {
+        let (went, updraft_mps) = in_air(0.6, |search| search.climbs().unwrap());
+        assert!(went && (updraft_mps - 0.6).abs() < 0.1, "{updraft_mps}");
+        let (went, updraft_mps) = in_air(0.0, |search| search.climbs().unwrap());
+        assert!(!went && updraft_mps == 0.0, "{updraft_mps}");
+    }
 
     #[test]
     fn the_most_is_climbed_to_from_the_best_of_the_starts() {
