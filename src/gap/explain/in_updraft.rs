@@ -550,6 +550,8 @@ mod tests {
         let goes = |to_mps: f64| in_air(1.0, |search| search.goes_to(to_mps).unwrap());
         assert_eq!(goes(1.0), (true, 1.0));
         assert_eq!(goes(-1.0), (false, 0.0), "and otherwise everything is as before");
+        let (went, _) = in_air(0.0, |search| search.goes_to(-0.002).unwrap());
+        assert!(!went, "as near to the logs, and nothing is gained");
     }
 
     #[test]
