@@ -602,6 +602,7 @@ pub(super) fn of_the_air(
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::admissible;
     use super::super::trial;
     use super::*;
 
@@ -638,6 +639,19 @@ mod tests {
         let blown = sides(&comparison);
         assert_eq!(blown.iter().filter(|sides| (*sides - ROUND).abs() < 1e-9).count(), still.len());
         assert_eq!(blown.len(), 2 * still.len());
+    }
+
+    #[test]
+    fn a_compensation_of_the_battery_may_do_too_little_and_too_much() {
+        let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        (comparison.scene.cells, comparison.scene.resting_v) = (3.0, 11.5);
+        let found = one(&trial::vehicle(), &comparison, Updraft::Same, "battery");
+        let battery = found.unwrap().unwrap();
+        let reached = |exponent: f64| {
+            let beta = |variant: &Variant| exponent / variant.size;
+            battery.variants.iter().any(|variant| admissible(&battery, variant, beta(variant)))
+        };
+        assert!([0.3, 1.0, -0.1, -0.6].into_iter().all(reached));
     }
 
     /// The model's current is that of its own motors, and the drones' may be another: the product of resistance and current

@@ -186,7 +186,13 @@ impl Effect for Battery {
             ],
             hooks: &[Hook::Command],
             shown: (Signal::ChargeUsed, 0.0, 2.0),
-            sought: Sought::Shape { size: "exponent", sizes: |_| &[1.0], usual: None, shape: None },
+            // Too little compensation, and too much.
+            sought: Sought::Shape {
+                size: "exponent",
+                sizes: |_| &[1.0, -0.4],
+                usual: None,
+                shape: None,
+            },
         }
     }
 
