@@ -66,8 +66,9 @@ impl Question<'_> {
             }
         }
         let blown_off = found.updraft_mps != 0.0 && self.is_nearer_in_still_air(train, &found)?;
-        if blown_off || found.was_in_updraft && !found.steps.is_empty() {
-            let (still, without) = self.searched(train, held, still_air)?;
+        if (blown_off || found.was_in_updraft && !found.steps.is_empty())
+            && let Some((still, without)) = if_flown(self.searched(train, held, still_air))?
+        {
             let (with_nats, still_nats) = (found.explains()?, still.explains()?);
             let left = |gap: &Gap| gap.left_over().is_some();
             let there = (blown_off || grows(&gap), left(&gap), -with_nats);
@@ -171,6 +172,15 @@ fn withdrawn(mut step: Step, others: &[Step]) -> Option<Step> {
     (step.finding.effects().len() > 1).then_some(step)
 }
 
+/// What was made, unless the vehicle cannot fly so: with what was found in an air that the flight was not in, that is no
+/// view of the flight.
+fn if_flown<T>(made: Result<T, GapError>) -> Result<Option<T>, GapError> {
+    match made {
+        Err(error) if error.is_not_flown() => Ok(None),
+        made => made.map(Some),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::dependence::Dependence;
@@ -199,6 +209,15 @@ mod tests {
         let unknown = Finding::Unknown { depends_on: Dependence::Climb, formula: None };
         let kept = alone(step(unknown.clone(), &["one"])).unwrap();
         assert_eq!(kept.finding, unknown);
+    }
+
+    #[test]
+    fn what_cannot_be_flown_in_still_air_is_no_view_of_the_flight() {
+        use crate::effects::EffectError;
+        let not_flown = EffectError::NotFlown { climb_mps: 0.8, horizontal_mps: 14.3 };
+        assert!(matches!(if_flown::<()>(Err(GapError::Effect(not_flown))), Ok(None)));
+        assert!(if_flown::<()>(Err(GapError::NoSimulatedSide)).is_err());
+        assert_eq!(if_flown(Ok(1)).ok().flatten(), Some(1));
     }
 
     #[test]
