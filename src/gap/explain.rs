@@ -187,7 +187,7 @@ pub(super) fn search(
     let begin = || Comparison::new(data, vehicle, simulated, plan);
     let comparison = flights.flown(None, 0.0, begin)?;
     let found = Found::nothing(comparison.clone());
-    let lacked_drag = Role::RotorDrag.is_on(vehicle) && !Role::RotorDrag.is_on(original);
+    let lacked_drag = lacked_drag([original, vehicle]);
     let (refused, last) = (Vec::new(), None);
     let mut search = Search {
         data,
@@ -226,6 +226,11 @@ pub(super) fn search(
     settle(&mut found);
     single::review(&mut found)?;
     Ok(found)
+}
+
+/// Whether a model has a drag of the rotors, and had none before leans told it.
+pub(super) fn lacked_drag([original, repaired]: [&Vehicle; 2]) -> bool {
+    Role::RotorDrag.is_on(repaired) && !Role::RotorDrag.is_on(original)
 }
 
 /// A search that goes on.
@@ -682,7 +687,8 @@ mod tests {
     use super::super::trial;
     use super::*;
 
-    fn begun<'a>(
+    /// A search at its beginning.
+    pub(super) fn begun<'a>(
         data: &'a Data,
         vehicle: &'a Vehicle,
         (simulated, options, flights): (&'a Simulated<'a>, &'a Options, &'a ModelFlights),

@@ -3,22 +3,18 @@
 use super::compare::{Comparison, Simulated};
 use super::data::Data;
 use super::error::GapError;
-use super::explain::{Found, Options, search};
+use super::explain::{Found, Options, lacked_drag, search};
 use super::heldout::Case;
 use super::instead::fewer_instead;
 use super::model_flights::ModelFlights;
+use super::search::FAR_NATS;
 use super::verdict::{Finding, Gap, Step};
-use crate::effects::Role;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
 /// A raw gap that grows by less is the same: rounding, and air that the drones do not share. The benchmark counts as
 /// worse what is more.
 const WORSE: f64 = 1.01;
-
-/// What explains so much less is no other view of the flight, nats, whatever it does to the raw gap, which has the air in
-/// it. Chosen: more than wrong readings of the air have cost.
-pub(super) const FAR_NATS: f64 = 100.0;
 
 /// What is searched for, and in what.
 #[derive(Clone, Copy)]
@@ -80,7 +76,8 @@ impl Question<'_> {
         let before = found.steps.clone();
         if !found.steps.is_empty() {
             let flown = |options: &Options| self.search(train, options);
-            found = fewer_instead(found, self.options, self.lacked_drag(), flown)?;
+            let by_leans = lacked_drag([self.original, self.repaired]);
+            found = fewer_instead(found, self.options, by_leans, flown)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;
             }
@@ -91,11 +88,6 @@ impl Question<'_> {
         let found = self.withdrawn(train, found, &before)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
-    }
-
-    /// Whether the model has a drag of the rotors only because leans told it.
-    fn lacked_drag(self) -> bool {
-        Role::RotorDrag.is_on(self.repaired) && !Role::RotorDrag.is_on(self.original)
     }
 
     /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search; the model as it

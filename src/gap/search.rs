@@ -419,6 +419,9 @@ pub(super) const FLOOR_NATS: f64 = 8.0;
 /// The least threshold for free shapes, nats, of which there are dozens: z = 5.3. The largest gain of any
 /// candidate in 440 flights with nothing missing was 13.6 (docs/physics.md, 3.3).
 pub(super) const FREE_FLOOR_NATS: f64 = 14.0;
+/// What explains so much less is no other view of the flight, nats, whatever it does to the raw gap, which has the air in
+/// it. Chosen: more than wrong readings of the air have cost.
+pub(super) const FAR_NATS: f64 = 100.0;
 /// Share of the replicates whose gains determine the exponential tail. Chosen.
 const TAIL: f64 = 0.25;
 

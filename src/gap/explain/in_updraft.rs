@@ -5,11 +5,10 @@ use rayon::prelude::*;
 use super::super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::super::error::GapError;
 use super::super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::super::kept::FAR_NATS;
 use super::super::noise::{GroupPattern, Hyper};
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
-use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
+use super::super::search::{FAR_NATS, FLOOR_NATS, FREE_FLOOR_NATS};
 use super::{Found, In, Look, MOST_GUSTS_MPS, Only, Search};
 
 impl Search<'_> {
@@ -148,27 +147,29 @@ impl Search<'_> {
     /// Goes into the updraft in which the flight of the present model is likeliest, with sizes that are fitted there, if
     /// that explains more; whether it did. A size that was fitted in another updraft keeps the search there.
     pub(super) fn goes_where_it_is_likelier(&mut self, hyper: Hyper) -> Result<bool, GapError> {
-        let mut went = self.climbs()?;
+        let before_nats = self.found.explains()?;
+        let nats = self.climbs(before_nats)?;
+        let went = nats > before_nats;
         let beaten_nats = self.options.only.map_or(f64::NEG_INFINITY, |only| only.beaten_nats);
-        if self.found.explains()? < beaten_nats - FAR_NATS {
+        if nats < beaten_nats - FAR_NATS {
             return Ok(went);
         }
         let hyper = if went { self.found.hyper } else { hyper };
         let start = [self.found.updraft_mps];
-        let Some((_, updraft_mps)) = self.likeliest_flight(hyper, &start, &FLIGHT_STEPS_MPS[..3])
-        else {
-            return Ok(went);
-        };
-        if updraft_mps != self.found.updraft_mps && self.goes_to(updraft_mps)? {
-            self.climbs()?;
-            went = true;
+        let likeliest = self.likeliest_flight(hyper, &start, &FLIGHT_STEPS_MPS[..3]);
+        let elsewhere = likeliest.filter(|(_, mps)| *mps != self.found.updraft_mps);
+        if let Some((_, updraft_mps)) = elsewhere
+            && let Some(nats) = self.goes_to(updraft_mps, nats)?
+        {
+            self.climbs(nats)?;
+            return Ok(true);
         }
         Ok(went)
     }
 
-    /// Goes into the updrafts that the slopes lead to, with all sizes free, as long as that explains more; whether it went.
-    fn climbs(&mut self) -> Result<bool, GapError> {
-        let mut went = false;
+    /// Goes into the updrafts that the slopes lead to, with all sizes free, as long as that explains more than the present
+    /// one, nats; what is explained at the end, nats.
+    fn climbs(&mut self, mut nats: f64) -> Result<f64, GapError> {
         for _ in 0..UPDRAFT_ROUNDS {
             let Self { comparison, found, .. } = &*self;
             let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
@@ -181,29 +182,34 @@ impl Search<'_> {
                 break;
             };
             let step_mps = (here.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-            if step_mps.abs() < UPDRAFT_SETTLED_MPS
-                || !(self.goes_to(at_mps + step_mps)? || self.goes_to(at_mps + 0.5 * step_mps)?)
-            {
+            if step_mps.abs() < UPDRAFT_SETTLED_MPS {
                 break;
             }
-            went = true;
+            let gone = match self.goes_to(at_mps + step_mps, nats)? {
+                None => self.goes_to(at_mps + 0.5 * step_mps, nats)?,
+                gone => gone,
+            };
+            let Some(there_nats) = gone else { break };
+            nats = there_nats;
         }
-        Ok(went)
+        Ok(nats)
     }
 
-    /// Goes into an updraft, with sizes that are fitted there, if that explains more; whether it did.
-    fn goes_to(&mut self, updraft_mps: f64) -> Result<bool, GapError> {
+    /// Goes into an updraft, with sizes that are fitted there, if that explains more than the present one, nats; how much,
+    /// nats, if it went.
+    fn goes_to(&mut self, updraft_mps: f64, here_nats: f64) -> Result<Option<f64>, GapError> {
         let before = (self.comparison.clone(), self.found.clone());
         self.found.updraft_mps = updraft_mps;
-        let is_more = self.is_fitted_here()?
+        if self.is_fitted_here()?
             && self.comparison.raw_gap_us()? < NEAR * before.0.raw_gap_us()?
-            && self.found.explains()? > before.1.explains()?;
-        if is_more {
+            && let nats = self.found.explains()?
+            && nats > here_nats
+        {
             self.found.was_in_updraft = true;
-        } else {
-            (self.comparison, self.found) = before;
+            return Ok(Some(nats));
         }
-        Ok(is_more)
+        (self.comparison, self.found) = before;
+        Ok(None)
     }
 
     /// How likely the flight of the present model is in the updraft in which it is likeliest, nats, and that updraft, m/s,
@@ -510,6 +516,7 @@ mod tests {
     use super::super::super::model_flights::ModelFlights;
     use super::super::super::trial;
     use super::super::Options;
+    use super::super::tests::begun;
     use super::*;
     use crate::effects::{Model, Signals};
 
@@ -528,37 +535,33 @@ mod tests {
         });
         let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
         let (options, flights) = (Options::default(), ModelFlights::default());
-        let mut search = Search {
-            data: &data,
-            vehicle: &vehicle,
-            lacked_drag: false,
-            simulated: &simulated,
-            plan: None,
-            options: &options,
-            flights: &flights,
-            found: Found::nothing(comparison.clone()),
-            comparison,
-            refused: Vec::new(),
-            last: None,
-        };
+        let mut search = begun(&data, &vehicle, (&simulated, &options, &flights), comparison);
         let made = of(&mut search);
         (made, search.found.updraft_mps)
     }
 
     #[test]
     fn an_updraft_is_gone_into_only_where_the_flight_is_explained_better_there() {
-        let goes = |to_mps: f64| in_air(1.0, |search| search.goes_to(to_mps).unwrap());
+        let went = |search: &mut Search<'_>, to_mps: f64| {
+            let here_nats = search.found.explains().unwrap();
+            search.goes_to(to_mps, here_nats).unwrap().is_some()
+        };
+        let goes = |to_mps: f64| in_air(1.0, |search| went(search, to_mps));
         assert_eq!(goes(1.0), (true, 1.0));
         assert_eq!(goes(-1.0), (false, 0.0), "and otherwise everything is as before");
-        let (went, _) = in_air(0.0, |search| search.goes_to(-0.002).unwrap());
+        let (went, _) = in_air(0.0, |search| went(search, -0.002));
         assert!(!went, "as near to the logs, and nothing is gained");
     }
 
     #[test]
     fn slopes_lead_to_the_updraft_of_the_flight() {
-        let (went, updraft_mps) = in_air(0.6, |search| search.climbs().unwrap());
+        let climbs = |search: &mut Search<'_>| {
+            let before_nats = search.found.explains().unwrap();
+            search.climbs(before_nats).unwrap() > before_nats
+        };
+        let (went, updraft_mps) = in_air(0.6, climbs);
         assert!(went && (updraft_mps - 0.6).abs() < 0.1, "{updraft_mps}");
-        let (went, updraft_mps) = in_air(0.0, |search| search.climbs().unwrap());
+        let (went, updraft_mps) = in_air(0.0, climbs);
         assert!(!went && updraft_mps == 0.0, "{updraft_mps}");
     }
 
