@@ -12,7 +12,7 @@ use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Only, Options};
 use super::verdict::{Finding, Step};
-use crate::effects::{LIBRARY, Role, Sought, find};
+use crate::effects::{LIBRARY, Role, Signal, Sought, find};
 
 /// Effects that are flown in place of what was found, at most. Chosen to bound the time.
 const MOST: usize = 5;
@@ -111,25 +111,42 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     }
     names.truncate(MOST);
     names.extend(lead);
+    let shapes = || {
+        let all = LIBRARY.iter().map(|effect| effect.definition());
+        all.filter(|one| matches!(one.sought, Sought::Shape { .. }))
+    };
+    // One of its kind may explain little here and all in an updraft of its own.
+    let kind = lead.and_then(find).map(|effect| effect.definition().class);
+    let alike: Vec<&str> =
+        shapes().filter(|one| Some(one.class) == kind).map(|one| one.name).collect();
+    names.extend(alike.into_iter().filter(|name| lead != Some(name)));
     // What is unknown in this updraft may be any effect of the climb in another.
     let is_of_climb = |step: &Step| match &step.finding {
         Finding::Unknown { depends_on, .. } => *depends_on == Dependence::Climb,
         Finding::Name { .. } | Finding::Class { .. } => false,
     };
     if steps.iter().any(is_of_climb) {
-        let shapes = LIBRARY.iter().map(|effect| effect.definition());
-        let sought = shapes.filter(|one| matches!(one.sought, Sought::Shape { .. }));
-        let all = sought.map(|one| one.name).filter(|name| depends_on_climb(name));
-        names.extend(all.filter(|name| !names.contains(name)).collect::<Vec<_>>());
+        names.extend(shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
     }
+    let mut known = Vec::new();
+    names.retain(|name| {
+        let is_new = !known.contains(name);
+        known.push(*name);
+        is_new
+    });
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
-    // only be that name's stand-in, unless leans tell a drag of the rotors.
+    // only be that name's stand-in, unless leans tell a drag of the rotors; what is unknown of the climb may be it as well.
     let axial = [Role::InflowShare, Role::BodyDragTop];
+    let has_climb = |step: &Step| match &step.finding {
+        Finding::Unknown { depends_on, .. } => depends_on.is_of(Signal::Climb),
+        Finding::Name { .. } | Finding::Class { .. } => false,
+    };
+    let is_unknown_of_climb = steps.iter().any(has_climb);
     let is_asked = |name: &&'static str| {
         steps.len() > 1 && axial.iter().any(|role| role.is_of(name)) || Role::RotorDrag.is_of(name)
     };
     if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
-        && (by_leans || names.iter().any(is_asked))
+        && (by_leans || is_unknown_of_climb || names.iter().any(is_asked))
         && !names.contains(&drag)
     {
         names.push(drag);
@@ -337,8 +354,9 @@ mod tests {
             let others = [("climb", 30.0), ("face-drag", 25.0), ("battery", 12.0)];
             rivals(&[step(effect, 26.0, &others)], false)
         };
-        assert_eq!(rivals_of("thrust-curve"), ["face-drag", "thrust-curve"]);
-        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow"]);
+        let all = ["face-drag", "thrust-curve", "parasitic-drag"];
+        assert_eq!(rivals_of("thrust-curve"), all, "its kind has its turn, whatever it explained");
+        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow", "response-drift"]);
         let inflow = [("rotor-inflow", 25.0)];
         let two = [step("thrust-curve", 26.0, &inflow), step("battery", 26.0, &[])];
         assert_eq!(rivals(&two, false), ["rotor-inflow", "momentum-drag"], "no round looks for it");
@@ -363,6 +381,9 @@ mod tests {
             assert!(all.contains(&effect), "{effect}");
         }
         assert!(!all.contains(&"motor-thermal") && !all.contains(&"turbulence"));
+        assert!(all.contains(&"momentum-drag"), "along the rotors' axis it is of the climb");
+        let with_height = rivals(&[unknown(Dependence::ClimbHeight)], false);
+        assert_eq!(with_height, ["rotor-inflow", "momentum-drag"]);
         assert_eq!(rivals(&[unknown(Dependence::Height)], false), ["rotor-inflow"]);
         let instead = |nats: f64| {
             let mut there = ended(0.0, &[]);

@@ -23,6 +23,9 @@ const GAP_S: f64 = 1.0;
 const BIAS_DOUBT_MPS: f64 = 0.001;
 /// The common standard error of lags, s: logs at 10 to 25 Hz, and delays of the filter. Chosen.
 const LAG_DOUBT_S: f64 = 0.002;
+/// Besides, as a share of the lag: a filter is fitted, and what is late may be a delay, in a loop of its own. In foreign
+/// worlds with delays of 0.12 to 0.35 s the lags of ten flights were off by 2 % (rms; docs/blind.md).
+const LAG_DOUBT_SHARE: f64 = 0.02;
 /// Lags that are tried, from 0 to 1 s, the range that the effect may have.
 const LAGS: usize = 51;
 /// Step between lags, s; a parabola goes through the best three.
@@ -46,7 +49,7 @@ pub(super) fn sensor<'a>(
     }
     let values: Vec<f64> = biases.iter().map(|(_, bias)| *bias).collect();
     let bias_mps = interval(&values, BIAS_DOUBT_MPS);
-    let lag_s = interval(&lags, LAG_DOUBT_S);
+    let lag_s = interval(&lags, lag_doubt_s(&lags));
     let beyond = |found: Option<Interval>, limit: f64| {
         found
             .is_some_and(|found| found.value.abs() > limit && (found.low > 0.0 || found.high < 0.0))
@@ -56,6 +59,12 @@ pub(super) fn sensor<'a>(
     let biased_drones =
         biases.iter().filter(|(_, bias)| (bias - centre).abs() > TOLD_BIAS_MPS).copied().collect();
     SensorChannel { bias_mps, lag_s, biased_drones, named, in_log: false }
+}
+
+/// The standard error that all lags share, s.
+fn lag_doubt_s(lags_s: &[f64]) -> f64 {
+    let mean_s = crate::numeric::mean(lags_s.iter().copied()).unwrap_or(0.0);
+    LAG_DOUBT_S.hypot(LAG_DOUBT_SHARE * mean_s)
 }
 
 /// Mean with the interval that the drones' scatter and a doubt they share give.
@@ -201,6 +210,17 @@ mod tests {
             }
         }
         lag(&flight, &segments)
+    }
+
+    #[test]
+    fn a_long_lag_is_known_less_well_than_a_short_one() {
+        let half_s = |lag_s: f64| {
+            let lags = [lag_s - 1e-6, lag_s, lag_s + 1e-6];
+            let of = interval(&lags, lag_doubt_s(&lags)).unwrap();
+            0.5 * (of.high - of.low)
+        };
+        assert!((half_s(0.0) - 0.0042).abs() < 1e-4, "{}", half_s(0.0));
+        assert!((half_s(0.35) - 0.0153).abs() < 1e-4, "{}", half_s(0.35));
     }
 
     #[test]

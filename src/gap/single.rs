@@ -51,7 +51,7 @@ pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     beside_something_larger(&mut found.steps);
     beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
-    beside_drag_of_the_body(found);
+    beside_inflow_and_drag_of_the_body(found);
     Ok(())
 }
 
@@ -221,19 +221,23 @@ fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     }
 }
 
-/// Momentum drag in wind, where no leg of known speed over ground told the wind: a body's drag is of the same form there, as
-/// the square of a speed that hardly changes is, and each reads another wind from the leans.
-fn beside_drag_of_the_body(found: &mut Found) {
+/// Momentum drag where no leg of known speed over ground told the wind. Along the rotors' axis it is inflow, which it is told
+/// with; ArduPilot's own frame has it by its equations. In wind a body's drag is of the same form, as the square of a speed
+/// that hardly changes is, and each reads another wind from the leans.
+fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
     let comparison = &found.comparison;
-    let [x_mps, y_mps] = comparison.wind.mean_mps;
-    let is_told = comparison.is_foreign() || comparison.wind.measured.is_some();
-    if is_told || x_mps.hypot(y_mps) < LEAST_WIND_MPS {
+    if comparison.is_foreign() || comparison.wind.measured.is_some() {
         return;
     }
-    let bodies = || [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter_map(Role::place);
+    let [x_mps, y_mps] = comparison.wind.mean_mps;
+    let inflow = [Role::InflowShare].into_iter().filter(|_| found.vehicle.airframe.sitl.is_none());
+    let is_windy = x_mps.hypot(y_mps) >= LEAST_WIND_MPS;
+    let bodies = [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter(|_| is_windy);
+    let others: Vec<String> =
+        inflow.chain(bodies).filter_map(Role::place).map(|place| place.name().to_owned()).collect();
     for step in &mut found.steps {
         if new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect)) {
-            doubt(step, bodies().map(|place| place.name().to_owned()));
+            doubt(step, others.iter().cloned());
         }
     }
 }
@@ -428,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn momentum_drag_without_legs_may_be_a_bodys() {
+    fn momentum_drag_without_legs_may_be_inflow_and_a_bodys() {
         let data = trial::data(2, |_, _| 0.0);
         let of = |effect: &str, wind_mps: [f64; 2], measured: bool| {
             let mut found = Found::nothing(trial::comparison(&data));
@@ -437,13 +441,15 @@ mod tests {
             wind.mean_mps = wind_mps;
             wind.measured = measured.then_some(Measured { law, linear_se: 1e-3, misfit_nats: 0.0 });
             found.steps = vec![step(name(effect), 118.0, 19.0, &[])];
-            beside_drag_of_the_body(&mut found);
+            beside_inflow_and_drag_of_the_body(&mut found);
             told(&found.steps).concat()
         };
         let wind = [3.0, -4.0];
-        assert_eq!(of("momentum-drag", wind, false), "momentum-drag parasitic-drag face-drag");
+        let all = "momentum-drag rotor-inflow parasitic-drag face-drag";
+        assert_eq!(of("momentum-drag", wind, false), all);
         assert_eq!(of("momentum-drag", wind, true), "momentum-drag", "legs told the wind");
-        assert_eq!(of("momentum-drag", [1.0, -1.0], false), "momentum-drag", "hardly any wind");
+        let calm = of("momentum-drag", [1.0, -1.0], false);
+        assert_eq!(calm, "momentum-drag rotor-inflow", "hardly any wind");
         assert_eq!(of("rotor-inflow", wind, false), "rotor-inflow");
     }
 }
