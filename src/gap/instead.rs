@@ -115,8 +115,9 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
         let all = LIBRARY.iter().map(|effect| effect.definition());
         all.filter(|one| matches!(one.sought, Sought::Shape { .. }))
     };
-    // One of its kind may explain little here and all in an updraft of its own.
-    let kind = lead.and_then(find).map(|effect| effect.definition().class);
+    // Of the climb, one of its kind may explain little here and all in an updraft of its own.
+    let of_climb = lead.filter(|name| depends_on_climb(name));
+    let kind = of_climb.and_then(find).map(|effect| effect.definition().class);
     let alike: Vec<&str> =
         shapes().filter(|one| Some(one.class) == kind).map(|one| one.name).collect();
     names.extend(alike.into_iter().filter(|name| lead != Some(name)));
