@@ -104,11 +104,7 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut names: Vec<&'static str> = Vec::new();
-    for (_, name) in all {
-        if !names.contains(&name) && lead != Some(name) {
-            names.push(name);
-        }
-    }
+    add_new(&mut names, all.into_iter().map(|(_, name)| name).filter(|name| lead != Some(name)));
     names.truncate(MOST);
     names.extend(lead);
     let shapes = || {
@@ -118,41 +114,38 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     // Of the climb, one of its kind may explain little here and all in an updraft of its own.
     let of_climb = lead.filter(|name| depends_on_climb(name));
     let kind = of_climb.and_then(find).map(|effect| effect.definition().class);
-    let alike: Vec<&str> =
-        shapes().filter(|one| Some(one.class) == kind).map(|one| one.name).collect();
-    names.extend(alike.into_iter().filter(|name| lead != Some(name)));
+    add_new(&mut names, shapes().filter(|one| Some(one.class) == kind).map(|one| one.name));
     // What is unknown in this updraft may be any effect of the climb in another.
-    let is_of_climb = |step: &Step| match &step.finding {
-        Finding::Unknown { depends_on, .. } => *depends_on == Dependence::Climb,
-        Finding::Name { .. } | Finding::Class { .. } => false,
-    };
-    if steps.iter().any(is_of_climb) {
-        names.extend(shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
+    let unknown: Vec<Dependence> = steps
+        .iter()
+        .filter_map(|step| match &step.finding {
+            Finding::Unknown { depends_on, .. } => Some(*depends_on),
+            Finding::Name { .. } | Finding::Class { .. } => None,
+        })
+        .collect();
+    if unknown.contains(&Dependence::Climb) {
+        add_new(&mut names, shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
     }
-    let mut known = Vec::new();
-    names.retain(|name| {
-        let is_new = !known.contains(name);
-        known.push(*name);
-        is_new
-    });
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
     // only be that name's stand-in, unless leans tell a drag of the rotors; what is unknown of the climb may be it as well.
     let axial = [Role::InflowShare, Role::BodyDragTop];
-    let has_climb = |step: &Step| match &step.finding {
-        Finding::Unknown { depends_on, .. } => depends_on.is_of(Signal::Climb),
-        Finding::Name { .. } | Finding::Class { .. } => false,
-    };
-    let is_unknown_of_climb = steps.iter().any(has_climb);
     let is_asked = |name: &&'static str| {
         steps.len() > 1 && axial.iter().any(|role| role.is_of(name)) || Role::RotorDrag.is_of(name)
     };
-    if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
-        && (by_leans || is_unknown_of_climb || names.iter().any(is_asked))
-        && !names.contains(&drag)
-    {
-        names.push(drag);
+    let is_unknown = unknown.iter().any(|depends_on| depends_on.is_of(Signal::Climb));
+    if by_leans || is_unknown || names.iter().any(is_asked) {
+        add_new(&mut names, Role::MomentumDrag.place().map(|place| place.name()));
     }
     names
+}
+
+/// Adds the names that are not there yet.
+fn add_new(names: &mut Vec<&'static str>, more: impl IntoIterator<Item = &'static str>) {
+    for name in more {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
 }
 
 /// Holds what was found against fewer findings, best first.

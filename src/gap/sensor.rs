@@ -24,7 +24,7 @@ const BIAS_DOUBT_MPS: f64 = 0.001;
 /// The common standard error of lags, s: logs at 10 to 25 Hz, and delays of the filter. Chosen.
 const LAG_DOUBT_S: f64 = 0.002;
 /// Besides, as a share of the lag: a filter is fitted, and what is late may be a delay, in a loop of its own. In foreign
-/// worlds with delays of 0.12 to 0.35 s the lags of ten flights were off by 2 % (rms; docs/blind.md).
+/// worlds with delays of 0.12 to 0.35 s those of 13 flights were off by 2 % (rms; docs/blind.md).
 const LAG_DOUBT_SHARE: f64 = 0.02;
 /// Lags that are tried, from 0 to 1 s, the range that the effect may have.
 const LAGS: usize = 51;

@@ -230,11 +230,12 @@ fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
         return;
     }
     let [x_mps, y_mps] = comparison.wind.mean_mps;
-    let inflow = [Role::InflowShare].into_iter().filter(|_| found.vehicle.airframe.sitl.is_none());
     let is_windy = x_mps.hypot(y_mps) >= LEAST_WIND_MPS;
-    let bodies = [Role::BodyDragTop, Role::FaceDragTop].into_iter().filter(|_| is_windy);
+    let inflow = found.vehicle.airframe.sitl.is_none().then_some(Role::InflowShare);
+    let bodies = is_windy.then_some([Role::BodyDragTop, Role::FaceDragTop]);
+    let roles = inflow.into_iter().chain(bodies.into_iter().flatten());
     let others: Vec<String> =
-        inflow.chain(bodies).filter_map(Role::place).map(|place| place.name().to_owned()).collect();
+        roles.filter_map(Role::place).map(|place| place.name().to_owned()).collect();
     for step in &mut found.steps {
         if new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect)) {
             doubt(step, others.iter().cloned());
@@ -276,6 +277,7 @@ mod tests {
     use super::super::trial::{self, name};
     use super::*;
     use crate::gap::refine::size_of;
+    use crate::vehicle::library;
 
     fn step(finding: Finding, gain_nats: f64, size_us: f64, rivals: &[&str]) -> Step {
         let rivals: Vec<(&str, f64)> = rivals.iter().map(|name| (*name, 9.0)).collect();
@@ -434,8 +436,9 @@ mod tests {
     #[test]
     fn momentum_drag_without_legs_may_be_inflow_and_a_bodys() {
         let data = trial::data(2, |_, _| 0.0);
-        let of = |effect: &str, wind_mps: [f64; 2], measured: bool| {
+        let of_vehicle = |vehicle: &str, effect: &str, wind_mps: [f64; 2], measured: bool| {
             let mut found = Found::nothing(trial::comparison(&data));
+            found.vehicle = library::builtin(vehicle).unwrap();
             let law = lean_law(&found.comparison.vehicle, 0.0, 0.0);
             let wind = &mut found.comparison.wind;
             wind.mean_mps = wind_mps;
@@ -444,6 +447,9 @@ mod tests {
             beside_inflow_and_drag_of_the_body(&mut found);
             told(&found.steps).concat()
         };
+        let of = |effect: &str, wind_mps: [f64; 2], measured: bool| {
+            of_vehicle("airsim-generic-quad", effect, wind_mps, measured)
+        };
         let wind = [3.0, -4.0];
         let all = "momentum-drag rotor-inflow parasitic-drag face-drag";
         assert_eq!(of("momentum-drag", wind, false), all);
@@ -451,5 +457,7 @@ mod tests {
         let calm = of("momentum-drag", [1.0, -1.0], false);
         assert_eq!(calm, "momentum-drag rotor-inflow", "hardly any wind");
         assert_eq!(of("rotor-inflow", wind, false), "rotor-inflow");
+        let own = of_vehicle("arducopter-sitl", "momentum-drag", [1.0, -1.0], false);
+        assert_eq!(own, "momentum-drag", "the frame of ArduPilot's simulator has it on all axes");
     }
 }
