@@ -5,13 +5,13 @@ use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use super::compare::Comparison;
-use super::data::Load;
 use super::decide::CLASS_NATS;
 use super::gls::{Column, Solution};
 use super::lean::GRAVITY;
 use super::noise::{GroupPattern, Hyper};
+use super::pack;
 use super::response::{self, Response};
-use super::scene::{Scene, hover_a};
+use super::scene::Scene;
 use crate::effects::{Definition, EffectError, LIBRARY, Role, Sought, find, select};
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
@@ -272,7 +272,7 @@ fn of_library(
                 shapes.iter().flat_map(|one| sides.iter().map(move |sides| (one, *sides)))
             {
                 let mut other = vehicle.clone();
-                prepare(&mut other, definition, &comparison.scene);
+                pack::prepare(&mut other, definition, &comparison.scene);
                 set(&mut other, definition.name, size, value);
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
@@ -389,39 +389,6 @@ fn is_hardly_felt(felt: &[Vec<Response>], response: &[Vec<Response>]) -> bool {
 /// Speed at which responses are compared besides the flown one, because some are flat in hover, m/s: the
 /// strength of a field day's gusts (docs/physics.md, 4.1).
 const FELT_AT_MPS: f64 = 0.5;
-
-/// Voltage of a lithium polymer cell at which a vehicle's hover is stated, V: the middle of its plateau.
-/// With another reference the sizes of `battery` came out a tenth low.
-const NOMINAL_V: f64 = 3.85;
-/// A voltage per cell this far from [`NOMINAL_V`] belongs to another number of cells, V: full and empty
-/// cells are within 0.35 V (4.2 and 3.5 V). Convention.
-const OTHER_V: f64 = 0.4;
-
-/// Sets what the logs say of an effect that is to be tried.
-fn prepare(vehicle: &mut Vehicle, definition: &Definition, scene: &Scene) {
-    let is_new = !vehicle.effects.get(definition.name).is_some_and(|table| table.on);
-    let is_battery = definition.with_role(Role::BatteryCells).is_some();
-    if is_battery && is_new && scene.resting_v > 0.0 {
-        Role::BatteryCells.set(vehicle, scene.cells);
-        Role::BatteryCharge.set(vehicle, 1.0);
-        // The model's hover is stated for its own nominal voltage, unless its battery is another.
-        if Role::BatteryReference
-            .value(vehicle)
-            .is_none_or(|volts| (volts / scene.cells - NOMINAL_V).abs() > OTHER_V)
-        {
-            Role::BatteryReference.set(vehicle, scene.cells * NOMINAL_V);
-        }
-        if let Some(Load { resistance_ohm, flown_a }) = scene.load {
-            // The voltage falls by what was flown with, whatever current the model's hover takes.
-            let more = flown_a.zip(hover_a(vehicle)).map_or(1.0, |(flown, model)| flown / model);
-            let more = more.clamp(1.0 / MOST_OTHER_CURRENT, MOST_OTHER_CURRENT);
-            Role::BatteryResistance.set(vehicle, (resistance_ohm * more).clamp(0.0, 1.0));
-        }
-    }
-}
-
-/// A current that differs more from the model's is not believed: an uncalibrated sensor. Chosen.
-const MOST_OTHER_CURRENT: f64 = 4.0;
 
 /// Sets a parameter of an effect and switches it on.
 pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
@@ -652,27 +619,5 @@ mod tests {
             battery.variants.iter().any(|variant| admissible(&battery, variant, beta(variant)))
         };
         assert!([0.3, 1.0, -0.1, -0.6].into_iter().all(reached));
-    }
-
-    /// The model's current is that of its own motors, and the drones' may be another: the product of resistance and current
-    /// is what the voltage falls by.
-    #[test]
-    fn a_battery_that_is_tried_falls_by_what_was_flown_with() {
-        let battery = find("battery").unwrap().definition();
-        let resistance_ohm = |flown_a: Option<f64>| {
-            let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
-            let scene = &mut comparison.scene;
-            (scene.cells, scene.resting_v) = (3.0, 11.5);
-            scene.load = Some(Load { resistance_ohm: 0.03, flown_a });
-            let mut vehicle = trial::vehicle();
-            prepare(&mut vehicle, battery, scene);
-            (hover_a(&vehicle).unwrap(), Role::BatteryResistance.value(&vehicle).unwrap())
-        };
-        let (model_a, alone_ohm) = resistance_ohm(None);
-        assert!((alone_ohm - 0.03).abs() < 1e-12, "{alone_ohm}");
-        let (_, ohm) = resistance_ohm(Some(1.5 * model_a));
-        assert!((ohm - 0.045).abs() < 1e-9, "{ohm}");
-        let (_, ohm) = resistance_ohm(Some(100.0 * model_a));
-        assert!((ohm - 0.12).abs() < 1e-9, "a sensor that is not calibrated: {ohm}");
     }
 }

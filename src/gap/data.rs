@@ -94,17 +94,8 @@ pub struct Data {
     pub groups: Vec<Group>,
     /// Drones left out, with their reasons.
     pub left_out: Vec<LeftOut>,
-    /// The batteries under load, if the logs have it.
-    pub load: Option<Load>,
-}
-
-/// Batteries under load: medians over the logs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load {
-    /// Resistance as the autopilots found it, ohm.
-    pub resistance_ohm: f64,
-    /// Current in flight, A, if it was logged.
-    pub flown_a: Option<f64>,
+    /// Resistance of the batteries, ohm, if the logs have it: median of what the autopilots found.
+    pub resistance_ohm: Option<f64>,
 }
 
 impl Data {
@@ -136,7 +127,7 @@ impl Data {
             let armed_s = first_armed_s(drones.iter().map(|(_, flight)| *flight));
             data.add(&group.name, &bins, values, armed_s);
         }
-        data.load = load(flown);
+        data.resistance_ohm = resistance_ohm(flown);
         let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
         data.count_neighbours(&plan.slots, spacing_m);
         data
@@ -167,7 +158,7 @@ impl Data {
             .collect();
         let armed_s = first_armed_s(flown.iter().map(|one| one.flight));
         data.add("all", &bins, values, armed_s);
-        data.load = load(flown);
+        data.resistance_ohm = resistance_ohm(flown);
         data
     }
 
@@ -326,7 +317,7 @@ impl Data {
                 .map(|group| group.only(|index| is_held(index) == held))
                 .collect(),
             left_out: self.left_out.clone(),
-            load: self.load,
+            resistance_ohm: self.resistance_ohm,
         };
         (part(false), part(true))
     }
@@ -374,20 +365,10 @@ pub(super) fn constant_us<'a>(
     (count > 2 && high - low < CONSTANT_US).then_some(low)
 }
 
-/// What the logs have of their batteries under load.
-fn load(flown: &[Flown<'_>]) -> Option<Load> {
-    let flights = || flown.iter().map(|one| one.flight);
-    let mut known: Vec<f64> = flights().filter_map(|flight| flight.resistance_ohm).collect();
-    known.retain(|ohm| *ohm > 0.0 && *ohm < 1.0);
-    // Who armed and gave up before the flight idled then.
-    let amps = |flight: &Flight| {
-        let length_s = |(start_s, end_s): &(f64, f64)| end_s - start_s;
-        let longest = flight.armed_s.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
-        let (start_s, end_s) = *longest?;
-        upper_median(flight.current_a.as_ref()?.between(start_s, end_s).to_vec())
-    };
-    let flown_a = upper_median(flights().filter_map(amps).filter(|amps| *amps > 0.0).collect());
-    Some(Load { resistance_ohm: upper_median(known)?, flown_a })
+/// Median of the resistances that batteries may have, ohm.
+fn resistance_ohm(flown: &[Flown<'_>]) -> Option<f64> {
+    let known = flown.iter().filter_map(|one| one.flight.resistance_ohm);
+    upper_median(known.filter(|ohm| *ohm > 0.0 && *ohm < 1.0).collect())
 }
 
 /// When the first of the drones armed, show time, s; infinity if none did.
@@ -430,6 +411,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         sum.lean_rad[0] += value.lean_rad[0];
         sum.lean_rad[1] += value.lean_rad[1];
         sum.resting_v += value.resting_v;
+        sum.power_w += value.power_w;
     }
     (count > 0.0).then(|| BinValues {
         pulse_us: sum.pulse_us / count,
@@ -437,6 +419,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         height_m: sum.height_m / count,
         lean_rad: sum.lean_rad.map(|sum| sum / count),
         resting_v: sum.resting_v / count,
+        power_w: sum.power_w / count,
     })
 }
 
@@ -444,7 +427,6 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
 mod tests {
     use super::super::trial;
     use super::*;
-    use crate::flight::Series;
     use crate::mission::resolve::{Override, resolve};
 
     fn slots(data: &Data) -> Vec<u16> {
@@ -452,35 +434,19 @@ mod tests {
     }
 
     #[test]
-    fn the_current_of_a_flight_is_that_of_its_longest_time_under_arms() {
-        let log = |ohm: f64, amps: f64| {
-            let time_s: Vec<f64> = (0..300).map(f64::from).collect();
-            let flown = |time_s: &f64| if (100.0..200.0).contains(time_s) { amps } else { 0.3 };
-            let value = time_s.iter().map(flown).collect();
-            let current = Series { time_s, value };
-            Flight {
-                // Armed and given up, flown, armed again after it.
-                armed_s: vec![(0.0, 60.0), (100.0, 200.0), (220.0, 290.0)],
-                current_a: Some(current),
-                resistance_ohm: Some(ohm),
-                ..Flight::default()
-            }
+    fn a_resistance_that_no_battery_has_is_none() {
+        let found_ohm = |known: &[f64]| {
+            let flights: Vec<Flight> = known
+                .iter()
+                .map(|ohm| Flight { resistance_ohm: Some(*ohm), ..Flight::default() })
+                .collect();
+            let flown: Vec<Flown<'_>> =
+                flights.iter().map(|flight| Flown { slot: 1, flight }).collect();
+            resistance_ohm(&flown)
         };
-        let mut logs = vec![log(0.02, 8.0), log(0.03, 9.0), log(0.04, 10.0)];
-        let loaded = |logs: &[Flight]| {
-            load(&logs.iter().map(|flight| Flown { slot: 1, flight }).collect::<Vec<_>>())
-        };
-        let Load { resistance_ohm, flown_a } = loaded(&logs).unwrap();
-        assert_eq!((resistance_ohm, flown_a), (0.03, Some(9.0)));
-        // A sensor that reads nothing tells no current, and a resistance that no battery has is none.
-        for one in &mut logs {
-            one.current_a = None;
-        }
-        assert_eq!(loaded(&logs).unwrap().flown_a, None);
-        for one in &mut logs {
-            one.resistance_ohm = Some(1.5);
-        }
-        assert!(loaded(&logs).is_none());
+        assert_eq!(found_ohm(&[0.02, 1.5, 0.03, 0.0, 0.04]), Some(0.03));
+        assert_eq!(found_ohm(&[1.5, 0.0]), None);
+        assert_eq!(found_ohm(&[]), None);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Measurement of a log in each steady bin.
 
 use super::bins::{Bin, BinValues};
-use crate::flight::{Flight, Indicator};
+use crate::flight::{Flight, Indicator, Series};
 
 /// Fewest samples in a usable bin: half a second of a log at 10 Hz. Chosen.
 const FEWEST_SAMPLES: usize = 5;
@@ -53,16 +53,20 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
         other => other.thrust_exponent(),
     };
     let cos = lean_rad[0].hypot(lean_rad[1]).cos();
-    let resting_v = flight.resting_v.as_ref().and_then(|series| {
+    let of_battery = |series: &Option<Series>| {
         // Logged once a second or ten times.
-        mean(series.between(start_s - 0.5, end_s + 0.5)).filter(|volts| *volts > 0.0)
-    });
+        let values = series.as_ref()?.between(start_s - 0.5, end_s + 0.5);
+        mean(values).filter(|value| *value > 0.0)
+    };
+    let power_w =
+        of_battery(&flight.voltage_v).zip(of_battery(&flight.current_a)).map(|(v, a)| v * a);
     let values = BinValues {
         pulse_us: zero + (pulse - zero) * cos.powf(exponent),
         climb_mps,
         height_m: mean(flight.height_m.between(start_s, end_s))?,
         lean_rad,
-        resting_v: resting_v.unwrap_or(f64::NAN),
+        resting_v: of_battery(&flight.resting_v).unwrap_or(f64::NAN),
+        power_w: power_w.unwrap_or(f64::NAN),
     };
     (values.pulse_us.is_finite() && values.height_m.is_finite()).then_some(values)
 }
@@ -115,7 +119,7 @@ fn lean(flight: &Flight, start_s: f64, end_s: f64, (sin, cos): (f64, f64)) -> Op
 /// Mean horizontal acceleration over a bin by the speeds at its ends, north and east, m/s².
 fn acceleration(flight: &Flight, start_s: f64, end_s: f64) -> Option<(f64, f64)> {
     let half_s = 0.5;
-    let of = |series: &crate::flight::Series| {
+    let of = |series: &Series| {
         let speed = |time_s: f64| {
             let ahead = series.at(time_s + half_s, GAP_S)?;
             Some((ahead - series.at(time_s - half_s, GAP_S)?) / (2.0 * half_s))

@@ -36,6 +36,7 @@ pub mod next;
 mod noise;
 #[cfg(test)]
 mod null_flights;
+mod pack;
 mod refine;
 mod refly;
 mod regimes;

@@ -9,7 +9,9 @@ use super::error::GapError;
 use super::generic::form_doubts;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, SHARED_TIME};
+use super::pack;
 use super::response::shifted;
+use super::scene::Scene;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
 use crate::effects::{Definition, Role, Sought, find};
@@ -178,7 +180,9 @@ pub(super) fn doubts(
     doubts.extend(comparison.spread_doubts(vehicle)?);
     doubts.extend(form_doubts(&comparison.scene));
     for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
-        let Some((form, sd)) = form_of(fitted).or_else(|| load_of(fitted, vehicle)) else {
+        let Some((form, sd)) =
+            form_of(fitted).or_else(|| load_of(fitted, &comparison.scene, vehicle))
+        else {
             continue;
         };
         let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);
@@ -208,13 +212,8 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
     Some((form, (high - low) / 2.0))
 }
 
-/// How much a battery's voltage falls under load may be wrong by this share: a resistance that the autopilot estimates, and
-/// a current that goes with another power of the thrust than the model's. It steepens the response, as a larger exponent
-/// does. Chosen.
-const LOAD_DOUBT: f64 = 0.5;
-
 /// The fall of the voltage under load, by the resistance, where the sag is fitted.
-fn load_of(size: &Parameter, vehicle: &Vehicle) -> Option<(Parameter, f64)> {
+fn load_of(size: &Parameter, scene: &Scene, vehicle: &Vehicle) -> Option<(Parameter, f64)> {
     let definition = find(size.effect)?.definition();
     let sag = definition.with_role(Role::BatterySag)?;
     if sag.name != size.name {
@@ -222,7 +221,7 @@ fn load_of(size: &Parameter, vehicle: &Vehicle) -> Option<(Parameter, f64)> {
     }
     let resistance = definition.with_role(Role::BatteryResistance)?.name;
     let ohm = Role::BatteryResistance.value(vehicle)?;
-    Some((parameter(definition, resistance)?, LOAD_DOUBT * ohm))
+    Some((parameter(definition, resistance)?, pack::load_doubt(scene) * ohm))
 }
 
 /// Whether a form is one of two, of which the search chooses: the size is that of the chosen one.

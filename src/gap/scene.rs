@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
-use super::data::{Data, Load};
+use super::data::Data;
 use super::gls::{Column, Pulses};
 use super::lean::Wind;
 use super::response::Response;
@@ -40,8 +40,10 @@ pub struct Scene {
     pub cells: f64,
     /// Mean voltage at rest, V; 0 if it was not logged.
     pub resting_v: f64,
-    /// The batteries under load as the logs have them.
-    pub load: Option<Load>,
+    /// Resistance of the batteries, ohm, if the logs have it.
+    pub resistance_ohm: Option<f64>,
+    /// Mean electrical power of the drones by group and bin, W; NaN where it was not logged.
+    pub flown_w: Vec<Vec<f64>>,
     neighbours: Vec<Vec<f64>>,
     /// What the logs of another program's simulation have more than the model that stands for it.
     as_flown: Option<AsFlown>,
@@ -85,7 +87,13 @@ impl Scene {
         let resting_v =
             mean(each().map(|values| values.resting_v)).filter(|_| logged).unwrap_or_default();
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
-        let load = data.load;
+        let flown_w = |group: &super::data::Group| -> Vec<f64> {
+            let of_drones = |bin: usize| group.measured.iter().map(move |drone| drone[bin].power_w);
+            let logged = |bin: usize| of_drones(bin).filter(|power_w| power_w.is_finite());
+            (0..group.bins.len()).map(|bin| mean(logged(bin)).unwrap_or(f64::NAN)).collect()
+        };
+        let flown_w = data.groups.iter().map(flown_w).collect();
+        let resistance_ohm = data.resistance_ohm;
         let relative_mps = wind.air_mps.clone();
         let updraft_mps = 0.0;
         Self {
@@ -95,7 +103,8 @@ impl Scene {
             volts,
             cells,
             resting_v,
-            load,
+            resistance_ohm,
+            flown_w,
             neighbours,
             as_flown: None,
         }
@@ -125,6 +134,13 @@ impl Scene {
         for (group, air) in scene.relative_mps.iter_mut().enumerate() {
             let mut bin = 0;
             air.retain(|_| {
+                bin += 1;
+                keep(group, bin - 1)
+            });
+        }
+        for (group, powers) in scene.flown_w.iter_mut().enumerate() {
+            let mut bin = 0;
+            powers.retain(|_| {
                 bin += 1;
                 keep(group, bin - 1)
             });
@@ -280,6 +296,15 @@ impl Scene {
         Ok(of_groups)
     }
 
+    /// Power of a vehicle's motors by group and bin, W.
+    ///
+    /// # Errors
+    /// As [`Scene::pulses`].
+    pub(super) fn power_w(&self, vehicle: &Vehicle) -> Result<Vec<Vec<f64>>, EffectError> {
+        let steady = self.steady(vehicle)?;
+        self.each(&steady, |steady, _, at| Ok(steady.balance(at, 0.0)?.power_w))
+    }
+
     /// Whether [`Scene::response`] has an answer for sure.
     pub(super) fn surely_answers(&self, vehicle: &Vehicle) -> bool {
         let Ok(steady) = self.steady(&calm(vehicle)) else { return false };
@@ -359,7 +384,7 @@ fn hover_ah_per_s(vehicle: &Vehicle) -> Option<f64> {
 }
 
 /// Current of a vehicle's hover, A; `None`: it has no battery.
-pub(super) fn hover_a(vehicle: &Vehicle) -> Option<f64> {
+fn hover_a(vehicle: &Vehicle) -> Option<f64> {
     Role::BatteryCharge.value(vehicle)?;
     let of = |role: Role| role.value(vehicle).unwrap_or_default();
     let power_w = Reference::of(vehicle).hover_w() + of(Role::BatteryAvionics);
