@@ -106,6 +106,8 @@ pub struct BinValues {
     pub lean_rad: [f64; 2],
     /// Battery voltage at rest, V; NaN if it was not logged.
     pub resting_v: f64,
+    /// Battery voltage under load, V; NaN if it was not logged.
+    pub loaded_v: f64,
     /// Electrical power, W; NaN if it was not logged.
     pub power_w: f64,
 }

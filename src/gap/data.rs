@@ -411,6 +411,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         sum.lean_rad[0] += value.lean_rad[0];
         sum.lean_rad[1] += value.lean_rad[1];
         sum.resting_v += value.resting_v;
+        sum.loaded_v += value.loaded_v;
         sum.power_w += value.power_w;
     }
     (count > 0.0).then(|| BinValues {
@@ -419,6 +420,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         height_m: sum.height_m / count,
         lean_rad: sum.lean_rad.map(|sum| sum / count),
         resting_v: sum.resting_v / count,
+        loaded_v: sum.loaded_v / count,
         power_w: sum.power_w / count,
     })
 }

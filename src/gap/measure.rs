@@ -58,14 +58,15 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
         let values = series.as_ref()?.between(start_s - 0.5, end_s + 0.5);
         mean(values).filter(|value| *value > 0.0)
     };
-    let power_w =
-        of_battery(&flight.voltage_v).zip(of_battery(&flight.current_a)).map(|(v, a)| v * a);
+    let loaded_v = of_battery(&flight.voltage_v);
+    let power_w = loaded_v.zip(of_battery(&flight.current_a)).map(|(volts, amps)| volts * amps);
     let values = BinValues {
         pulse_us: zero + (pulse - zero) * cos.powf(exponent),
         climb_mps,
         height_m: mean(flight.height_m.between(start_s, end_s))?,
         lean_rad,
         resting_v: of_battery(&flight.resting_v).unwrap_or(f64::NAN),
+        loaded_v: loaded_v.unwrap_or(f64::NAN),
         power_w: power_w.unwrap_or(f64::NAN),
     };
     (values.pulse_us.is_finite() && values.height_m.is_finite()).then_some(values)

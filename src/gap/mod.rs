@@ -37,6 +37,7 @@ mod noise;
 #[cfg(test)]
 mod null_flights;
 mod pack;
+mod power_channel;
 mod refine;
 mod refly;
 mod regimes;

@@ -10,11 +10,12 @@ use super::generic::form_doubts;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, SHARED_TIME};
 use super::pack;
+use super::power_channel;
 use super::response::shifted;
 use super::scene::Scene;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
-use crate::effects::{Definition, Role, Sought, find};
+use crate::effects::{Class, Definition, LIBRARY, Role, Sought, find};
 use crate::numeric::extent;
 use crate::vehicle::Vehicle;
 
@@ -85,19 +86,20 @@ impl Facing {
     fn of(
         comparison: &Comparison,
         vehicle: &Vehicle,
-        parameters: &[Parameter],
+        (all, parameters): (&[Parameter], &[Parameter]),
         gusts_mps: f64,
     ) -> Result<Self, GapError> {
         Ok(Self {
             patterns: comparison.patterns(vehicle, gusts_mps)?,
             split: Split::of(&comparison.residual(vehicle, gusts_mps)?),
             slopes: slopes(comparison, vehicle, parameters)?,
-            doubts: doubts(comparison, vehicle, parameters)?,
+            doubts: doubts(comparison, vehicle, all)?,
         })
     }
 }
 
-/// Fits the parameters jointly, from the values that the vehicle has, with further regressors free.
+/// Fits the parameters jointly, from the values that the vehicle has, with further regressors free. What another channel
+/// tells better than the pulse has that value.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -111,13 +113,74 @@ pub(super) fn refine(
     fit_noise: bool,
 ) -> Result<Fit, GapError> {
     let mut vehicle = vehicle.clone();
+    let told = told_elsewhere(comparison, &mut vehicle, parameters);
+    let is_free = |told: &Option<(f64, f64)>| told.is_none();
+    let free = parameters.iter().zip(&told).filter(|(_, told)| is_free(told));
+    let free: Vec<Parameter> = free.map(|(parameter, _)| parameter.clone()).collect();
+    let mut fit =
+        refine_free(comparison, vehicle, (parameters, &free), extras, start, gusts_mps, fit_noise)?;
+    let mut values = std::mem::take(&mut fit.values).into_iter();
+    fit.values = told.iter().filter_map(|told| told.or_else(|| values.next())).collect();
+    Ok(fit)
+}
+
+/// Values and standard errors of the parameters that another channel than the pulse tells, which the vehicle gets.
+fn told_elsewhere(
+    comparison: &Comparison,
+    vehicle: &mut Vehicle,
+    parameters: &[Parameter],
+) -> Vec<Option<(f64, f64)>> {
+    let mut told = Vec::new();
+    for parameter in parameters {
+        let sag = find(parameter.effect).and_then(|e| e.definition().with_role(Role::BatterySag));
+        if sag.is_none_or(|sag| sag.name != parameter.name) {
+            told.push(None);
+            continue;
+        }
+        let found = power_channel::told(&comparison.data, drifts_otherwise(vehicle, parameter));
+        let (low, high) = parameter.bounds;
+        let found =
+            found.map(|found| (found.exponent.clamp(low, high), found.se)).filter(|found| {
+                let mut other = vehicle.clone();
+                set(&mut other, parameter.effect, parameter.name, found.0);
+                let flies = comparison.scene_of(&other).pulses(&other).is_ok();
+                if flies {
+                    *vehicle = other;
+                }
+                flies
+            });
+        told.push(found);
+    }
+    told
+}
+
+/// Whether the vehicle has another effect than a parameter's that changes the pulse with time.
+fn drifts_otherwise(vehicle: &Vehicle, parameter: &Parameter) -> bool {
+    LIBRARY.iter().map(|effect| effect.definition()).any(|definition| {
+        definition.name != parameter.effect
+            && definition.class == Class::TimeDrift
+            && matches!(definition.sought, Sought::Shape { .. })
+            && vehicle.effects.get(definition.name).is_some_and(|table| table.on)
+    })
+}
+
+/// Fits those of the parameters that are free.
+fn refine_free(
+    comparison: &Comparison,
+    mut vehicle: Vehicle,
+    (all, parameters): (&[Parameter], &[Parameter]),
+    extras: &[Column],
+    start: Hyper,
+    gusts_mps: f64,
+    fit_noise: bool,
+) -> Result<Fit, GapError> {
     let mut hyper = start;
     let mut last = None;
     let mut shifts: Vec<Vec<f64>> = Vec::new();
     let mut flown = vehicle.clone();
     for round in 0..ROUNDS {
         let Facing { mut patterns, split, slopes, doubts } =
-            match Facing::of(comparison, &vehicle, parameters, gusts_mps) {
+            match Facing::of(comparison, &vehicle, (all, parameters), gusts_mps) {
                 Ok(facing) => facing,
                 // Too far: gusts or doubts take it where it cannot fly.
                 Err(error) if error.is_not_flown() && last.is_some() => {

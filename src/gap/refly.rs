@@ -131,6 +131,7 @@ impl<'a> BinRecorder<'a> {
                 height_m: mean(sums.height_m),
                 lean_rad,
                 resting_v: mean(sums.resting_v),
+                loaded_v: f64::NAN,
                 power_w: f64::NAN,
             })
         };

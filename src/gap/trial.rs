@@ -52,6 +52,7 @@ pub(super) fn data(drones: usize, more_us: impl Fn(usize, &Bin) -> f64) -> Data 
             height_m: 30.0,
             lean_rad: [0.0; 2],
             resting_v: f64::NAN,
+            loaded_v: f64::NAN,
             power_w: f64::NAN,
         }
     };
