@@ -41,7 +41,7 @@ const OTHER_DRIFT: f64 = 3.0;
 pub(super) struct Told {
     /// The exponent: 0 where something compensates the voltage, 1 where nothing does.
     pub exponent: f64,
-    /// Standard error.
+    /// Standard error of the exponent, of the scatter between drones and of the form.
     pub se: f64,
 }
 
