@@ -176,13 +176,13 @@ fn fitted(rows: &[Row], drones: usize, with_trend: bool) -> Option<Told> {
 const SAME: f64 = 1e-9;
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::trial;
     use super::*;
 
     /// Drones of different charge in air that wanders: the rotors' effort goes with it and with the climb, the power with
     /// a power of the effort.
-    fn flown(exponent: f64, drift: f64, spread: f64, power: impl Fn(f64, f64) -> f64) -> Data {
+    pub fn flown(exponent: f64, drift: f64, spread: f64, power: impl Fn(f64, f64) -> f64) -> Data {
         let mut data = trial::data(8, |_, _| 0.0);
         for group in &mut data.groups {
             let all_s = group.bins.last().unwrap().middle_s();
@@ -208,7 +208,7 @@ mod tests {
         data
     }
 
-    fn motors(effort: f64, _: f64) -> f64 {
+    pub fn motors(effort: f64, _: f64) -> f64 {
         200.0 * effort.powf(1.6)
     }
 

@@ -456,4 +456,33 @@ mod tests {
         };
         assert!(at(2.0) > at(-2.0) && at(-2.0) > 0.0, "{} and {}", at(2.0), at(-2.0));
     }
+
+    #[test]
+    fn a_sag_has_the_exponent_that_the_logged_power_tells() {
+        let data = power_channel::tests::flown(0.6, 0.0, 0.1, power_channel::tests::motors);
+        let comparison = trial::comparison(&data);
+        let mut vehicle = trial::vehicle();
+        set(&mut vehicle, "battery", "exponent", 0.2);
+        let battery = find("battery").unwrap().definition();
+        let of = |name: &str| parameter(battery, name).unwrap();
+        let fitted = |parameters: &[Parameter]| {
+            refine(&comparison, &vehicle, parameters, &[], Hyper::default(), 0.0, false).unwrap()
+        };
+        let fit = fitted(&[of("exponent")]);
+        let [(exponent, se)] = fit.values[..] else { panic!("{:?}", fit.values) };
+        assert!((exponent - 0.6).abs() < 0.01 && se < 0.03, "{exponent} {se}");
+        assert_eq!(value_of(&fit.vehicle, "battery", "exponent"), Some(exponent));
+        // Others beside it are fitted, and stay in their places.
+        let fit = fitted(&[of("resistance_ohm"), of("exponent")]);
+        assert_eq!(fit.values.len(), 2);
+        assert!((fit.values[1].0 - 0.6).abs() < 0.01, "{:?}", fit.values);
+        // Without a current there is nothing else than the pulse.
+        let mut data = data;
+        for values in data.groups.iter_mut().flat_map(|group| group.measured.iter_mut().flatten()) {
+            values.power_w = f64::NAN;
+        }
+        let told = told_elsewhere(&trial::comparison(&data), &mut vehicle, &[of("exponent")]);
+        assert_eq!(told, [None]);
+        assert_eq!(value_of(&vehicle, "battery", "exponent"), Some(0.2));
+    }
 }
