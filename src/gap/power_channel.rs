@@ -182,7 +182,12 @@ pub(super) mod tests {
 
     /// Drones of different charge in air that wanders: the rotors' effort goes with it and with the climb, the power with
     /// a power of the effort.
-    pub fn flown(exponent: f64, drift: f64, spread: f64, power: impl Fn(f64, f64) -> f64) -> Data {
+    pub(in crate::gap) fn flown(
+        exponent: f64,
+        drift: f64,
+        spread: f64,
+        power: impl Fn(f64, f64) -> f64,
+    ) -> Data {
         let mut data = trial::data(8, |_, _| 0.0);
         for group in &mut data.groups {
             let all_s = group.bins.last().unwrap().middle_s();
@@ -208,7 +213,7 @@ pub(super) mod tests {
         data
     }
 
-    pub fn motors(effort: f64, _: f64) -> f64 {
+    pub(in crate::gap) fn motors(effort: f64, _: f64) -> f64 {
         200.0 * effort.powf(1.6)
     }
 
