@@ -266,13 +266,14 @@ fn of_library(
         };
         let is_body = parameter.role == Some(Role::BodyDragTop) && now == 0.0;
         let sides = if is_body { sides_tried(vehicle, comparison) } else { vec![None] };
+        let mut prepared = vehicle.clone();
+        pack::prepare(&mut prepared, definition, &comparison.scene);
         let mut variants = Vec::new();
         for value in sizes {
             for (shape, sides) in
                 shapes.iter().flat_map(|one| sides.iter().map(move |sides| (one, *sides)))
             {
-                let mut other = vehicle.clone();
-                pack::prepare(&mut other, definition, &comparison.scene);
+                let mut other = prepared.clone();
                 set(&mut other, definition.name, size, value);
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
@@ -339,7 +340,7 @@ pub(super) fn axial_drag(
     };
     let (name, parameter) = (place.name(), place.parameter);
     let (definition, size) = (place.effect.definition(), parameter.name);
-    if vehicle.effects.get(name).is_some_and(|table| table.on) {
+    if Role::MomentumDrag.is_on(vehicle) {
         return Ok(None);
     }
     let usual = (parameter.default)(vehicle);

@@ -393,11 +393,17 @@ fn fill(drones: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
                 .collect();
             let offset_us = mean(&apart).unwrap_or_default();
             let value = |(own, mean): (&Option<BinValues>, &Option<BinValues>)| {
-                own.or_else(|| mean.map(|m| BinValues { pulse_us: m.pulse_us + offset_us, ..m }))
+                own.or_else(|| mean.map(|m| filling(&m, offset_us)))
             };
             drone.iter().zip(&means).filter_map(value).collect()
         })
         .collect()
+}
+
+/// What stands in a hole. The others' voltage under load and power do not go with the drone's own pulse.
+fn filling(mean: &BinValues, offset_us: f64) -> BinValues {
+    let pulse_us = mean.pulse_us + offset_us;
+    BinValues { pulse_us, loaded_v: f64::NAN, power_w: f64::NAN, ..*mean }
 }
 
 fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues> {
@@ -504,6 +510,7 @@ mod tests {
         // The others' mean is 1523 us, and drone 5 is 20 us above the mean of all.
         assert!((filled.pulse_us - 1543.0).abs() < 1e-9, "{filled:?}");
         assert!((filled.height_m - 1523.0).abs() < 1e-9, "nothing else has an offset: {filled:?}");
+        assert!(filled.loaded_v.is_nan() && filled.power_w.is_nan(), "not its own: {filled:?}");
         assert_eq!(data.groups[0].measured[0][3].pulse_us, 1508.0, "what was measured stays");
     }
 

@@ -33,9 +33,8 @@ pub(super) fn load_doubt(scene: &Scene) -> f64 {
 
 /// Sets what the logs say of an effect that is to be tried.
 pub(super) fn prepare(vehicle: &mut Vehicle, definition: &Definition, scene: &Scene) {
-    let is_new = !vehicle.effects.get(definition.name).is_some_and(|table| table.on);
     let is_battery = definition.with_role(Role::BatteryCells).is_some();
-    if !is_battery || !is_new || scene.resting_v <= 0.0 {
+    if !is_battery || Role::BatteryCells.is_on(vehicle) || scene.resting_v <= 0.0 {
         return;
     }
     Role::BatteryCells.set(vehicle, scene.cells);

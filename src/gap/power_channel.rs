@@ -13,10 +13,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bins::BinValues;
 use super::data::Data;
+use super::steady::IDLE_US;
 use crate::numeric::mean;
 
-/// The pulse without thrust, us.
-const IDLE_US: f64 = 1000.0;
 /// Fewest drones whose scatter tells an error. Chosen.
 const FEWEST_DRONES: usize = 4;
 /// Least scatter of the logarithm of the pulse around the fit: pulses that follow the power more closely are what the

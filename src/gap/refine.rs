@@ -14,8 +14,8 @@ use super::power_channel;
 use super::response::shifted;
 use super::scene::Scene;
 use super::verdict::{Fitted, Interval};
-use crate::effects::select::value_of;
-use crate::effects::{Class, Definition, LIBRARY, Role, Sought, find};
+use crate::effects::select::{acting, value_of};
+use crate::effects::{Class, Definition, Role, Sought, find};
 use crate::numeric::extent;
 use crate::vehicle::Vehicle;
 
@@ -114,8 +114,7 @@ pub(super) fn refine(
 ) -> Result<Fit, GapError> {
     let mut vehicle = vehicle.clone();
     let told = told_elsewhere(comparison, &mut vehicle, parameters);
-    let is_free = |told: &Option<(f64, f64)>| told.is_none();
-    let free = parameters.iter().zip(&told).filter(|(_, told)| is_free(told));
+    let free = parameters.iter().zip(&told).filter(|(_, told)| told.is_none());
     let free: Vec<Parameter> = free.map(|(parameter, _)| parameter.clone()).collect();
     let mut fit =
         refine_free(comparison, vehicle, (parameters, &free), extras, start, gusts_mps, fit_noise)?;
@@ -130,37 +129,46 @@ fn told_elsewhere(
     vehicle: &mut Vehicle,
     parameters: &[Parameter],
 ) -> Vec<Option<(f64, f64)>> {
-    let mut told = Vec::new();
-    for parameter in parameters {
-        let sag = find(parameter.effect).and_then(|e| e.definition().with_role(Role::BatterySag));
-        if sag.is_none_or(|sag| sag.name != parameter.name) {
-            told.push(None);
-            continue;
-        }
-        let found = power_channel::told(&comparison.data, drifts_otherwise(vehicle, parameter));
+    let mut of = |parameter: &Parameter| {
+        sag_of(parameter)?;
+        let told = power_channel::told(&comparison.data, drifts_otherwise(vehicle, parameter))?;
         let (low, high) = parameter.bounds;
-        let found =
-            found.map(|found| (found.exponent.clamp(low, high), found.se)).filter(|found| {
-                let mut other = vehicle.clone();
-                set(&mut other, parameter.effect, parameter.name, found.0);
-                let flies = comparison.scene_of(&other).pulses(&other).is_ok();
-                if flies {
-                    *vehicle = other;
-                }
-                flies
-            });
-        told.push(found);
+        let exponent = told.exponent.clamp(low, high);
+        flies_with(comparison, vehicle, parameter, exponent).then_some((exponent, told.se))
+    };
+    parameters.iter().map(&mut of).collect()
+}
+
+/// The effect of which a parameter is the voltage's exponent; `None`: it is another parameter.
+fn sag_of(parameter: &Parameter) -> Option<&'static Definition> {
+    let definition = find(parameter.effect)?.definition();
+    let sag = definition.with_role(Role::BatterySag)?;
+    (sag.name == parameter.name).then_some(definition)
+}
+
+/// Gives the vehicle a value unless it cannot fly with it.
+fn flies_with(
+    comparison: &Comparison,
+    vehicle: &mut Vehicle,
+    parameter: &Parameter,
+    value: f64,
+) -> bool {
+    let mut other = vehicle.clone();
+    set(&mut other, parameter.effect, parameter.name, value);
+    let flies = comparison.scene_of(&other).pulses(&other).is_ok();
+    if flies {
+        *vehicle = other;
     }
-    told
+    flies
 }
 
 /// Whether the vehicle has another effect than a parameter's that changes the pulse with time.
 fn drifts_otherwise(vehicle: &Vehicle, parameter: &Parameter) -> bool {
-    LIBRARY.iter().map(|effect| effect.definition()).any(|definition| {
+    acting(vehicle).any(|effect| {
+        let definition = effect.definition();
         definition.name != parameter.effect
             && definition.class == Class::TimeDrift
             && matches!(definition.sought, Sought::Shape { .. })
-            && vehicle.effects.get(definition.name).is_some_and(|table| table.on)
     })
 }
 
@@ -213,12 +221,8 @@ fn refine_free(
             let next = (now + by).clamp(low, high);
             moved = moved.max((next - now).abs() / se.max(1e-12));
             values.push((next, se));
-            let mut other = vehicle.clone();
-            set(&mut other, parameter.effect, parameter.name, next);
             // A value that the vehicle cannot have stops there.
-            if comparison.scene_of(&other).pulses(&other).is_ok() {
-                vehicle = other;
-            }
+            flies_with(comparison, &mut vehicle, parameter, next);
         }
         last = Some(Fit { vehicle: vehicle.clone(), hyper, values });
         if moved < 0.05 && (round >= 2 || !fit_noise) {
@@ -277,11 +281,7 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
 
 /// The fall of the voltage under load, by the resistance, where the sag is fitted.
 fn load_of(size: &Parameter, scene: &Scene, vehicle: &Vehicle) -> Option<(Parameter, f64)> {
-    let definition = find(size.effect)?.definition();
-    let sag = definition.with_role(Role::BatterySag)?;
-    if sag.name != size.name {
-        return None;
-    }
+    let definition = sag_of(size)?;
     let resistance = definition.with_role(Role::BatteryResistance)?.name;
     let ohm = Role::BatteryResistance.value(vehicle)?;
     Some((parameter(definition, resistance)?, pack::load_doubt(scene) * ohm))

@@ -125,33 +125,17 @@ impl Scene {
     pub fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
         let mut scene = self.clone();
         for (group, signals) in scene.signals.iter_mut().enumerate() {
-            let mut bin = 0;
-            signals.retain(|_| {
-                bin += 1;
-                keep(group, bin - 1)
-            });
+            keep_bins(signals, |bin| keep(group, bin));
         }
         for (group, air) in scene.relative_mps.iter_mut().enumerate() {
-            let mut bin = 0;
-            air.retain(|_| {
-                bin += 1;
-                keep(group, bin - 1)
-            });
+            keep_bins(air, |bin| keep(group, bin));
         }
         for (group, powers) in scene.flown_w.iter_mut().enumerate() {
-            let mut bin = 0;
-            powers.retain(|_| {
-                bin += 1;
-                keep(group, bin - 1)
-            });
+            keep_bins(powers, |bin| keep(group, bin));
         }
         for (group, drones) in scene.volts.iter_mut().flatten().enumerate() {
             for volts in drones {
-                let mut bin = 0;
-                volts.retain(|_| {
-                    bin += 1;
-                    keep(group, bin - 1)
-                });
+                keep_bins(volts, |bin| keep(group, bin));
             }
         }
         scene
@@ -364,6 +348,12 @@ impl Scene {
             Ok(pulses_us)
         })
     }
+}
+
+/// Only some bins of a series.
+fn keep_bins<T>(series: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
+    let mut bins = 0..;
+    series.retain(|_| bins.next().is_some_and(&keep));
 }
 
 /// A vehicle without what shakes: that has a scatter of its own, which hides how it answers gusts.
