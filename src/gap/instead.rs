@@ -12,7 +12,7 @@ use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Only, Options};
 use super::verdict::{Finding, Step};
-use crate::effects::{LIBRARY, Role, Signal, Sought, find};
+use crate::effects::{Class, LIBRARY, Role, Signal, Sought, find};
 
 /// Effects that are flown in place of what was found, at most. Chosen to bound the time.
 const MOST: usize = 5;
@@ -111,11 +111,6 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
         let all = LIBRARY.iter().map(|effect| effect.definition());
         all.filter(|one| matches!(one.sought, Sought::Shape { .. }))
     };
-    // Of the climb, one of its kind may explain little here and all in an updraft of its own.
-    let of_climb = lead.filter(|name| depends_on_climb(name));
-    let kind = of_climb.and_then(find).map(|effect| effect.definition().class);
-    add_new(&mut names, shapes().filter(|one| Some(one.class) == kind).map(|one| one.name));
-    // What is unknown in this updraft may be any effect of the climb in another.
     let unknown: Vec<Dependence> = steps
         .iter()
         .filter_map(|step| match &step.finding {
@@ -123,7 +118,13 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
             Finding::Name { .. } | Finding::Class { .. } => None,
         })
         .collect();
-    if unknown.contains(&Dependence::Climb) {
+    // Of the climb alone, any effect may explain little in this updraft and all in one of its own.
+    let is_of_climb = |step: &Step| {
+        let first = step.finding.effects().first().and_then(|name| find(name));
+        let first = first.map(|effect| effect.definition());
+        first.is_some_and(|one| depends_on_climb(one.name) && one.class != Class::TimeDrift)
+    };
+    if unknown.contains(&Dependence::Climb) || steps.iter().any(is_of_climb) {
         add_new(&mut names, shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
     }
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
@@ -181,7 +182,9 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     let (most, margin) = (best.nats.max(there.nats), margin_nats(gain(&told.found)));
     let updraft_mps = told.found.updraft_mps;
     let mut names = Vec::new();
-    if is_single && !is_instead {
+    // The same effect is what it was, wherever it explains more, and so are those that it was not told from.
+    let is_same = is_single && leads(&best.found) == known;
+    if is_single && (!is_instead || is_same) {
         names.extend(there.found.steps[0].finding.effects().into_iter().map(str::to_owned));
     }
     // Who was found first must be beaten clearly.
@@ -192,7 +195,7 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
         other.nats > most - if is_in_other_air { margin.max(PRODUCT_NATS) } else { margin }
     };
     let near = others.iter().filter(is_near);
-    for name in near.flat_map(|other| leads(&other.found)).chain(beside.into_iter().flatten()) {
+    for name in near.flat_map(|other| all(&other.found)).chain(beside.into_iter().flatten()) {
         if !names.contains(&name) {
             names.push(name);
         }
@@ -223,6 +226,12 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
 fn leads(found: &Found) -> Vec<String> {
     let effects = found.steps.iter().map(|step| step.finding.effects());
     effects.filter_map(|names| names.first().map(|name| (*name).to_owned())).collect()
+}
+
+/// All names of each finding.
+fn all(found: &Found) -> Vec<String> {
+    let effects = found.steps.iter().flat_map(|step| step.finding.effects());
+    effects.map(str::to_owned).collect()
 }
 
 /// A finding with these names, and the sizes that the first of them has.
@@ -312,6 +321,19 @@ mod tests {
     }
 
     #[test]
+    fn who_was_not_told_apart_stays_so() {
+        let found = || ended(0.0, &["thrust-curve/vortex-ring"]);
+        // The same effect explains more in an updraft of its own.
+        let same = vec![ended(0.5, &["thrust-curve"])];
+        assert_eq!(told(found(), same), ["thrust-curve/vortex-ring"]);
+        assert_eq!(told(found(), vec![ended(20.0, &["face-drag"])]), ["face-drag"]);
+        // Whoever is as good brings those along that are not told from it.
+        let others = vec![ended(-3.0, &["momentum-drag/rotor-inflow"])];
+        let all = told(ended(0.0, &["parasitic-drag"]), others);
+        assert_eq!(all, ["parasitic-drag/momentum-drag/rotor-inflow"]);
+    }
+
+    #[test]
     fn nothing_stands_instead_of_findings_that_explain_no_more_than_they_cost() {
         let of = |gain_nats: f64| {
             let mut nothing = ended(0.0, &[]);
@@ -348,12 +370,20 @@ mod tests {
             let others = [("climb", 30.0), ("face-drag", 25.0), ("battery", 12.0)];
             rivals(&[step(effect, 26.0, &others)], false)
         };
-        let all = ["face-drag", "thrust-curve", "parasitic-drag"];
-        assert_eq!(rivals_of("thrust-curve"), all, "its kind has its turn, whatever it explained");
-        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow", "response-drift"]);
-        let inflow = [("rotor-inflow", 25.0)];
-        let two = [step("thrust-curve", 26.0, &inflow), step("battery", 26.0, &[])];
-        assert_eq!(rivals(&two, false), ["rotor-inflow", "momentum-drag"], "no round looks for it");
+        assert_eq!(rivals_of("motor-thermal"), ["face-drag", "motor-thermal"]);
+        // Of the climb every effect has its turn, whatever it explained.
+        for effect in ["thrust-curve", "rotor-inflow"] {
+            let all = rivals_of(effect);
+            assert_eq!(all[..2], ["face-drag", effect]);
+            for other in ["parasitic-drag", "thrust-curve", "vortex-ring", "rotor-inflow"] {
+                assert!(all.contains(&other), "{other} in place of {effect}");
+            }
+            assert!(!all.contains(&"motor-thermal"), "{all:?}");
+        }
+        // A battery's load grows in a climb, and yet it goes with time.
+        assert_eq!(rivals_of("battery"), ["face-drag", "battery"]);
+        let two = [step("thrust-curve", 26.0, &[]), step("battery", 26.0, &[])];
+        assert!(rivals(&two, false).contains(&"momentum-drag"), "no round looks for it");
         // So has a drag of the rotors that leans told, also beside a single name.
         let by_lean =
             [step("translational-lift/blade-flapping", 26.0, &[("blade-flapping", 24.0)])];

@@ -5,7 +5,7 @@ use nalgebra::SMatrix;
 use rayon::prelude::*;
 
 use super::bins::Bin;
-use super::filter::{Observation, State, log_det_and_chi2};
+use super::gusts::{Gusts, Seen};
 use super::lean::LeanLaw;
 use crate::numeric::mean;
 use crate::numeric::{differences, minimise};
@@ -17,8 +17,13 @@ const SQUARE_DOUBT: f64 = 0.15;
 /// 1.0 to 1.5 degrees per m/s (docs/physics.md, 2.6). 0.01 before gusts were fitted with the law; chosen.
 const LINEAR_DOUBT: f64 = 0.03;
 /// Linear parts from which the search starts besides the model's, rad/(m/s): small rotors have 0.6 to 1.7
-/// degrees per m/s. The fit has several minima.
-const USUAL_LINEAR: [f64; 2] = [0.01, 0.03];
+/// degrees per m/s. The fit has several minima: of two flights whose models were tried with a body besides a drag of
+/// the rotors, the deepest was found from nearly none in one, and from the usual ones in the other.
+const USUAL_LINEAR: [f64; 3] = [0.001, 0.01, 0.03];
+/// Searches from where the last one ended, at most: each has only so many steps. Numerical.
+const SEARCHES: usize = 4;
+/// A search that gains less was at the bottom already, nats. Numerical.
+const BOTTOM_NATS: f64 = 0.02;
 /// Prior median of the gusts, m/s: 15 % of 1 to 6 m/s of wind are 0.15 to 0.9.
 const GUST_MPS: f64 = 0.5;
 /// Prior standard deviation of the gusts, as a factor. Chosen wide.
@@ -124,12 +129,12 @@ pub(super) struct Fitted {
 /// Fits the law from the model's. The search starts from the model's own linear part and from what small
 /// rotors usually have: with too small a one the wind begins far too strong.
 pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
-    let points = in_order(points);
+    let leans = Leans::of(points);
     let model = usable(model);
-    let (at, misfit_nats) = most_probable(&points, model, Lacks::Rotors);
+    let (at, misfit_nats) = most_probable(&leans, model, Lacks::Rotors);
     let found = Candidate::of(&at, model, Lacks::Rotors);
     // A wall is no knowledge: what is against it may be anything behind it.
-    let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Rotors));
+    let errors = standard_errors(&at, |at| misfit(&leans, at, model, Lacks::Rotors));
     Fitted {
         law: found.law,
         linear_se: UNITS[DRAG] * errors[DRAG],
@@ -141,10 +146,10 @@ pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
 
 /// Fits a round body in place of a drag of the rotors, which was fitted to the same leans with this misfit, nats.
 pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw, of_rotors_nats: f64) -> Body {
-    let points = in_order(points);
+    let leans = Leans::of(points);
     let model = usable(model);
-    let (at, misfit_nats) = most_probable(&points, model, Lacks::Body);
-    let errors = standard_errors(&at, |at| misfit(&points, at, model, Lacks::Body));
+    let (at, misfit_nats) = most_probable(&leans, model, Lacks::Body);
+    let errors = standard_errors(&at, |at| misfit(&leans, at, model, Lacks::Body));
     Body {
         square: BODY_UNIT * at[DRAG],
         square_se: BODY_UNIT * errors[DRAG],
@@ -152,9 +157,26 @@ pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw, of_rotors_nats: f64) 
     }
 }
 
-fn in_order(mut points: Vec<Point>) -> Vec<Point> {
-    points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    points
+/// Leans in the order of time, with what is the same for every law.
+struct Leans {
+    points: Vec<Point>,
+    /// What is left at each of them of the gusts at the one before.
+    decay: Vec<f64>,
+    /// Logarithms of the heights, from their mean.
+    aloft: Vec<f64>,
+}
+
+impl Leans {
+    fn of(mut points: Vec<Point>) -> Self {
+        points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let middle = mean(points.iter().map(|point| point.ln_height)).unwrap_or_default();
+        let aloft = points.iter().map(|point| point.ln_height - middle).collect();
+        let before = points.first().into_iter().chain(&points);
+        let steps = points.iter().zip(before);
+        let decay =
+            steps.map(|(point, before)| (-(point.time_s - before.time_s) / GUST_S).exp()).collect();
+        Self { points, decay, aloft }
+    }
 }
 
 /// A model's law with both parts, as numbers that a search can begin with.
@@ -163,24 +185,36 @@ fn usable(model: LeanLaw) -> LeanLaw {
 }
 
 /// The most probable variables and their misfit.
-fn most_probable(points: &[Point], model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
-    let objective = |at: &[f64; COUNT]| misfit(points, at, model, lacks) + wall(at, lacks);
+fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
+    let objective = |at: &[f64; COUNT]| misfit(leans, at, model, lacks) + wall(at, lacks);
     let search = |drag: &f64| {
         let mut start =
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
-        let [x, y] = hovering_wind(points, Candidate::of(&start, model, lacks).law);
+        let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).law);
         (start[0], start[1]) = (x, y);
         minimise(start, objective, |at, value| differences(objective, at, value))
     };
-    let starts = match lacks {
+    let starts: Vec<f64> = match lacks {
         Lacks::Rotors => {
-            [model.linear, USUAL_LINEAR[0], USUAL_LINEAR[1]].map(|linear| linear / UNITS[DRAG])
+            let all = [model.linear].into_iter().chain(USUAL_LINEAR);
+            all.map(|linear| linear / UNITS[DRAG]).collect()
         }
-        Lacks::Body => BODIES.map(|square| square / BODY_UNIT),
+        Lacks::Body => BODIES.map(|square| square / BODY_UNIT).to_vec(),
     };
     let ends: Vec<([f64; COUNT], f64)> = starts.par_iter().map(search).collect();
     let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
-    best.unwrap_or(([0.0; COUNT], f64::INFINITY))
+    let mut best = best.unwrap_or(([0.0; COUNT], f64::INFINITY));
+    for _ in 1..SEARCHES {
+        let next = minimise(best.0, objective, |at, value| differences(objective, at, value));
+        let gained = best.1 - next.1;
+        if gained > 0.0 {
+            best = next;
+        }
+        if gained < BOTTOM_NATS {
+            break;
+        }
+    }
+    best
 }
 
 /// Mean wind that a law reads from the leans in hover and in vertical flight, m/s.
@@ -225,32 +259,27 @@ impl Candidate {
 /// Minus the logarithm of the posterior density, without its constant: each lean is the law's in the mean
 /// wind, and gusts change it by the law's slopes there. (The other way round, from leans to the wind, a law
 /// without a linear part has no slope where a lean is small.)
-fn misfit(points: &[Point], at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> f64 {
+fn misfit(leans: &Leans, at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> f64 {
     let of = Candidate::of(at, model, lacks);
-    let gust = State { variance: of.gust_mps * of.gust_mps, time_s: GUST_S };
-    let shear = State { variance: SHEAR * SHEAR, time_s: f64::INFINITY };
-    let middle = mean(points.iter().map(|point| point.ln_height)).unwrap_or_default();
-    let mut seen = Vec::with_capacity(2 * points.len());
-    let mut off = Vec::with_capacity(2 * points.len());
-    for point in points {
+    let mut gusts = Gusts::new(of.gust_mps, SHEAR);
+    for (point, (decay, aloft)) in leans.points.iter().zip(leans.decay.iter().zip(&leans.aloft)) {
         let [vx, vy, climb_mps] = point.velocity_mps;
         let air = [vx - of.mean_mps[0], vy - of.mean_mps[1]];
         let wanted = of.law.lean(air, climb_mps);
         let slopes = of.law.slopes(air, climb_mps);
-        let scatter = of.scatter_rad.hypot(if point.moves { UNSETTLED_RAD } else { 0.0 });
-        let more_mps = of.mean_mps.map(|mean_mps| mean_mps * (point.ln_height - middle));
-        for axis in 0..2 {
-            let aloft: f64 = (0..2).map(|of| slopes[(axis, of)] * more_mps[of]).sum();
-            let gusts = (0..2).map(|gust| (gust, -slopes[(axis, gust)]));
-            seen.push(Observation {
-                time_s: point.time_s,
-                looks_at: gusts.chain([(2, -aloft)]).collect(),
-                noise: scatter * scatter,
-            });
-            off.push(point.lean_rad[axis] - wanted[axis]);
-        }
+        let scatter =
+            if point.moves { of.scatter_rad.hypot(UNSETTLED_RAD) } else { of.scatter_rad };
+        let more_mps = of.mean_mps.map(|mean_mps| mean_mps * aloft);
+        let seen = [0, 1].map(|axis| {
+            let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
+            Seen {
+                off: point.lean_rad[axis] - wanted[axis],
+                looks_at: [by_air[0], by_air[1], by_air[0] * more_mps[0] + by_air[1] * more_mps[1]],
+                variance: scatter * scatter,
+            }
+        });
+        gusts.see(*decay, seen);
     }
-    let (log_det, chi2) = log_det_and_chi2(&[gust, gust, shear], &seen, &off);
     let square = |value: f64| value * value;
     let drag = match lacks {
         Lacks::Rotors => (of.law.linear - model.linear) / LINEAR_DOUBT,
@@ -260,7 +289,7 @@ fn misfit(points: &[Point], at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> 
         + square(drag)
         + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
         + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln());
-    0.5 * (log_det + chi2 + known)
+    gusts.misfit_nats() + 0.5 * known
 }
 
 /// Cost of a drag by which a drone would lean against the wind, nats.

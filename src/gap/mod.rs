@@ -19,6 +19,7 @@ mod filter;
 mod formula;
 mod generic;
 mod gls;
+mod gusts;
 mod heldout;
 mod in_field;
 mod instead;

@@ -17,7 +17,8 @@ impl Search<'_> {
     pub(super) fn look_where_it_explains_most(&mut self, only: Only) -> Result<Look, GapError> {
         let (first, begin) = (self.comparison.clone(), self.found.clone());
         let bins = first.data.bins_of_groups();
-        let mut best: Option<(f64, Look, Comparison, Found)> = None;
+        // Without the effect, an updraft in which it is none may explain more than any in which it is one does at first.
+        let mut best: Option<((bool, f64), Look, Comparison, Found)> = None;
         let mut starts = [&[0.0, only.updraft_mps], &UPDRAFTS_MPS[..]].concat();
         starts.dedup();
         for updraft_mps in starts {
@@ -30,9 +31,10 @@ impl Search<'_> {
             }
             let look = self.look(In::Present(None))?;
             let share = updraft_mps / UPDRAFT_DOUBT_MPS;
-            let nats = look.explained().nats - 0.5 * share * share;
-            if best.as_ref().is_none_or(|(most, ..)| nats > *most) {
-                best = Some((nats, look, self.comparison.clone(), self.found.clone()));
+            let explained = look.explained();
+            let by = (explained.lacks_effect, explained.nats - 0.5 * share * share);
+            if best.as_ref().is_none_or(|(most, ..)| by > *most) {
+                best = Some((by, look, self.comparison.clone(), self.found.clone()));
             }
         }
         let Some((_, look, comparison, found)) = best else {
