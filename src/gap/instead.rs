@@ -121,8 +121,10 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     // Of the climb alone, any effect may explain little in this updraft and all in one of its own.
     let is_of_climb = |step: &Step| {
         let first = step.finding.effects().first().and_then(|name| find(name));
-        let first = first.map(|effect| effect.definition());
-        first.is_some_and(|one| depends_on_climb(one.name) && one.class != Class::TimeDrift)
+        first.is_some_and(|effect| {
+            let known = effect.definition();
+            depends_on_climb(known.name) && known.class != Class::TimeDrift
+        })
     };
     if unknown.contains(&Dependence::Climb) || steps.iter().any(is_of_climb) {
         add_new(&mut names, shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
