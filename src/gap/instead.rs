@@ -187,7 +187,7 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     // The same effect is what it was, wherever it explains more, and so are those that it was not told from.
     let is_same = is_single && leads(&best.found) == known;
     if is_single && (!is_instead || is_same) {
-        names.extend(there.found.steps[0].finding.effects().into_iter().map(str::to_owned));
+        names.extend(all(&there.found));
     }
     // Who was found first must be beaten clearly.
     let is_beside = is_single && is_instead && there.nats > most - PRODUCT_NATS;
