@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
+use std::sync::OnceLock;
 
 use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
@@ -70,6 +71,10 @@ pub struct Comparison {
     is_foreign: bool,
     /// Wind that another program simulated, where the measured drones flew in another, m/s.
     other_wind_mps: Option<[f64; 2]>,
+    /// Whether the simulated side was flown for this comparison.
+    is_flown: bool,
+    /// How unlikely the leans are, nats, once it was asked for.
+    lean_misfit_nats: OnceLock<f64>,
 }
 
 /// Power of thrust that `u - 1000` goes with at hover.
@@ -249,6 +254,8 @@ impl Comparison {
             spreads,
             is_foreign,
             other_wind_mps: None,
+            is_flown: matches!(simulated, Simulated::Refly(_)),
+            lean_misfit_nats: OnceLock::new(),
         };
         if is_foreign && comparison.apart_rad() > OTHER_WIND_DEG.to_radians() {
             comparison.other_wind_mps = Some([flown_mps[0], flown_mps[1]]);
@@ -402,6 +409,8 @@ impl Comparison {
             spreads: self.spreads.clone(),
             is_foreign: self.is_foreign,
             other_wind_mps: self.other_wind_mps,
+            is_flown: self.is_flown,
+            lean_misfit_nats: OnceLock::new(),
         }
     }
 
@@ -454,6 +463,18 @@ impl Comparison {
         let [without, with] =
             [&self.vehicle, &larger].map(|one| lean_law(one, self.amsl_m, updraft_mps).square);
         Some((told, with - without))
+    }
+
+    /// How unlikely the leans of the flight are if it was the vehicle that flew, in the updraft that it was flown in, nats, but
+    /// for a constant; 0: they tell nothing of it.
+    pub(super) fn lean_misfit_nats(&self) -> f64 {
+        *self.lean_misfit_nats.get_or_init(|| {
+            if !self.is_flown || !self.reads_wind(&self.vehicle) {
+                return 0.0;
+            }
+            let law = lean_law(&self.vehicle, self.amsl_m, self.flown_mps[2]);
+            lean::misfit_nats(&self.data, law, (&self.side, self.flown_mps))
+        })
     }
 
     fn wind_by(&self, law: LeanLaw) -> Wind {

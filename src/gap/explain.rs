@@ -1,5 +1,6 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
+mod form;
 mod in_updraft;
 mod telling;
 
@@ -147,8 +148,8 @@ impl Found {
         }
     }
 
-    /// How well the findings explain the flight, nats: its likelihood with them, less what each must explain to be
-    /// found at all, and how rare the updraft is.
+    /// How well the findings explain the flight, nats: its likelihood with them, that of the leans as well, less what each
+    /// must explain to be found at all, and how rare the updraft is.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
@@ -167,7 +168,8 @@ impl Found {
             Finding::Name { .. } | Finding::Class { .. } => FLOOR_NATS,
         };
         let share = self.updraft_mps / UPDRAFT_DOUBT_MPS;
-        Ok(likely - self.steps.iter().map(price).sum::<f64>() - 0.5 * share * share)
+        let leans_nats = comparison.lean_misfit_nats();
+        Ok(likely - leans_nats - self.steps.iter().map(price).sum::<f64>() - 0.5 * share * share)
     }
 }
 
@@ -275,13 +277,15 @@ struct Look {
     candidates: Vec<Candidate>,
     generics: Vec<Generic>,
     drones: Vec<usize>,
+    /// How unlikely the leans are, nats.
+    lean_misfit_nats: f64,
     /// What explains how much, once it is computed.
     round: OnceLock<Round>,
 }
 
 /// How well a look's air and noise explain the flight, with the best effect.
 struct Explained {
-    /// Log-posterior, and what the best effect gains above its threshold, nats.
+    /// Log-posterior, that of the leans as well, and what the best effect gains above its threshold, nats.
     nats: f64,
     /// Whether an effect gains more than its threshold.
     lacks_effect: bool,
@@ -294,7 +298,7 @@ impl Look {
         let round = self.round();
         let by_effect = (round.best() - FLOOR_NATS).max(0.0);
         Explained {
-            nats: round.base.log_posterior() + by_effect,
+            nats: round.base.log_posterior() - self.lean_misfit_nats + by_effect,
             lacks_effect: by_effect > 0.0,
             lacks_shape: round.best_generic() > FREE_FLOOR_NATS,
         }
@@ -396,6 +400,7 @@ impl Search<'_> {
             }
         }
         self.fly_again()?;
+        self.chooses_form()?;
         Ok(true)
     }
 
@@ -468,6 +473,7 @@ impl Search<'_> {
             candidates,
             generics,
             drones,
+            lean_misfit_nats: comparison.lean_misfit_nats(),
             round: OnceLock::new(),
         })
     }

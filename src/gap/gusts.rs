@@ -1,46 +1,45 @@
-//! Likelihood of leans that gusts change along both axes, and a wind that grows with height in proportion: a filter of
-//! three states, as [`super::filter`] has it for any number, without what that costs. A law is fitted in thousands of
-//! evaluations.
+//! Likelihood of leans that gusts change along both axes, and what lasts in proportion: a wind that grows with height, or
+//! a law of another form. A filter of few states, as [`super::filter`] has it for any number, without what that costs. A
+//! law is fitted in thousands of evaluations.
 
 /// The leans of one moment along one axis, as the gusts and the growth of the wind change them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct Seen<const N: usize> {
     /// Lean less the law's, rad.
     pub off: f64,
-    /// Change of it by either gust, rad/(m/s), and by the growth of the wind.
-    pub looks_at: [f64; 3],
+    /// Change of it by either gust, rad/(m/s), and by what lasts.
+    pub looks_at: [f64; N],
     /// Variance of what is the lean's own, rad².
     pub variance: f64,
 }
 
-/// Gusts along both axes and the growth of the wind with height, as far as the leans so far tell them.
+/// Gusts along both axes and what lasts, as far as the leans so far tell them.
 #[derive(Clone, Debug)]
-pub(super) struct Gusts {
+pub(super) struct Gusts<const N: usize> {
     gust_variance: f64,
-    state: [f64; 3],
-    covariance: [[f64; 3]; 3],
+    state: [f64; N],
+    covariance: [[f64; N]; N],
     log_det: f64,
     chi2: f64,
 }
 
-impl Gusts {
-    /// Of such a standard deviation along either axis, m/s, and of such a growth.
-    pub(super) fn new(gust_mps: f64, growth: f64) -> Self {
-        let gust_variance = gust_mps * gust_mps;
-        let mut covariance = [[0.0; 3]; 3];
-        for (place, variance) in [gust_variance, gust_variance, growth * growth].iter().enumerate()
-        {
-            covariance[place][place] = *variance;
+impl<const N: usize> Gusts<N> {
+    /// Of such standard deviations: of the gusts along either axis, m/s, and of each thing that lasts.
+    pub(super) fn new(sizes: [f64; N]) -> Self {
+        let mut covariance = [[0.0; N]; N];
+        for (place, size) in sizes.iter().enumerate() {
+            covariance[place][place] = size * size;
         }
-        Self { gust_variance, state: [0.0; 3], covariance, log_det: 0.0, chi2: 0.0 }
+        let gust_variance = covariance[0][0];
+        Self { gust_variance, state: [0.0; N], covariance, log_det: 0.0, chi2: 0.0 }
     }
 
     /// Takes in the leans of the next moment, until which so much is left of the gusts.
-    pub(super) fn see(&mut self, decay: f64, seen: [Seen; 2]) {
+    pub(super) fn see(&mut self, decay: f64, seen: [Seen<N>; 2]) {
         let fresh = self.gust_variance * (1.0 - decay * decay);
         for gust in 0..2 {
             self.state[gust] *= decay;
-            for other in 0..3 {
+            for other in 0..N {
                 self.covariance[gust][other] *= decay;
                 self.covariance[other][gust] *= decay;
             }
@@ -52,9 +51,9 @@ impl Gusts {
             let total = variance + dot(cross, looks_at);
             let innovation = off - dot(self.state, looks_at);
             let share = innovation / total;
-            for row in 0..3 {
+            for row in 0..N {
                 self.state[row] += cross[row] * share;
-                for column in 0..3 {
+                for column in 0..N {
                     self.covariance[row][column] -= cross[row] * cross[column] / total;
                 }
             }
@@ -70,8 +69,8 @@ impl Gusts {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn dot<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
+    (1..N).fold(a[0] * b[0], |sum, place| sum + a[place] * b[place])
 }
 
 #[cfg(test)]
@@ -87,7 +86,7 @@ mod tests {
             [1.3, 0.4, 0.9].map(|turns| 0.02 * (turns * (3 * moment + axis) as f64 + 0.3).sin())
         };
         let off = |moment: usize, axis: usize| 0.01 * ((2 * moment + axis) as f64).cos();
-        let mut gusts = Gusts::new(gust_mps, growth);
+        let mut gusts = Gusts::new([gust_mps, gust_mps, growth]);
         let (mut observations, mut series) = (Vec::new(), Vec::new());
         for (moment, time_s) in times_s.into_iter().enumerate() {
             let before_s = times_s[moment.saturating_sub(1)];

@@ -6,6 +6,7 @@ use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::filter::{Filter, LooksAt, Observation, State};
 use super::lean_fit::{Body, Fitted, Point, fit, fit_body, hovering_wind};
+use super::lean_misfit;
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
 use crate::numeric::Moments;
@@ -398,6 +399,12 @@ pub(super) fn body(
 ) -> Option<Body> {
     let points = points(data, &settled_leans(data, law, Some(flown)));
     moves(&points).then(|| fit_body(points, law, measured.misfit_nats))
+}
+
+/// How unlikely the leans are by a vehicle's law in the updraft that it holds in, nats, but for a constant. `flown` is as in
+/// [`wind`].
+pub(super) fn misfit_nats(data: &Data, law: LeanLaw, flown: (&[Vec<BinValues>], [f64; 3])) -> f64 {
+    lean_misfit::misfit_nats(points(data, &settled_leans(data, law, Some(flown))), law)
 }
 
 /// The mean of the wind with the law of the lean that it was read by.

@@ -25,7 +25,7 @@ const SEARCHES: usize = 4;
 /// A search that gains less was at the bottom already, nats. Numerical.
 const BOTTOM_NATS: f64 = 0.02;
 /// Prior median of the gusts, m/s: 15 % of 1 to 6 m/s of wind are 0.15 to 0.9.
-const GUST_MPS: f64 = 0.5;
+pub(super) const GUST_MPS: f64 = 0.5;
 /// Prior standard deviation of the gusts, as a factor. Chosen wide.
 const GUST_FACTOR: f64 = 2.5;
 /// Time scale of the gusts, s, as in the benchmark. Not fitted; bins of 3 s hardly show it.
@@ -33,12 +33,12 @@ const GUST_S: f64 = 25.0;
 /// Prior standard deviation of the exponent by which the wind grows with height: 1/7 over flat land, up to 0.3 over
 /// rough (Stull 1988, section 9.7). Legs and hovers are flown at several heights, and what the wind gains aloft must not
 /// be taken from the law.
-const SHEAR: f64 = 0.2;
+pub(super) const SHEAR: f64 = 0.2;
 /// Heights below this count as this, m: the roughness layer.
 const LOWEST_M: f64 = 1.0;
 /// Prior median of the scatter of a group's mean lean in a bin, rad: a tenth of a degree, what attitudes of
 /// the firmware are off by (docs/firmware.md).
-const SCATTER_RAD: f64 = 0.002;
+pub(super) const SCATTER_RAD: f64 = 0.002;
 /// Prior standard deviation of the scatter, as a factor. Chosen.
 const SCATTER_FACTOR: f64 = 2.0;
 /// What the lean still lacks of its steady value on legs that are too short to settle, beyond what the
@@ -71,7 +71,7 @@ const STEP: f64 = 0.02;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
     time_s: f64,
-    velocity_mps: [f64; 3],
+    pub velocity_mps: [f64; 3],
     /// Logarithm of the height, in m.
     ln_height: f64,
     lean_rad: [f64; 2],
@@ -132,7 +132,7 @@ pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
     let leans = Leans::of(points);
     let model = usable(model);
     let (at, misfit_nats) = most_probable(&leans, model, Lacks::Rotors);
-    let found = Candidate::of(&at, model, Lacks::Rotors);
+    let found = Candidate::of(&at, model, Lacks::Rotors).air;
     // A wall is no knowledge: what is against it may be anything behind it.
     let errors = standard_errors(&at, |at| misfit(&leans, at, model, Lacks::Rotors));
     Fitted {
@@ -158,8 +158,8 @@ pub(super) fn fit_body(points: Vec<Point>, model: LeanLaw, of_rotors_nats: f64) 
 }
 
 /// Leans in the order of time, with what is the same for every law.
-struct Leans {
-    points: Vec<Point>,
+pub(super) struct Leans {
+    pub points: Vec<Point>,
     /// What is left at each of them of the gusts at the one before.
     decay: Vec<f64>,
     /// Logarithms of the heights, from their mean.
@@ -167,7 +167,7 @@ struct Leans {
 }
 
 impl Leans {
-    fn of(mut points: Vec<Point>) -> Self {
+    pub(super) fn of(mut points: Vec<Point>) -> Self {
         points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let middle = mean(points.iter().map(|point| point.ln_height)).unwrap_or_default();
         let aloft = points.iter().map(|point| point.ln_height - middle).collect();
@@ -177,10 +177,47 @@ impl Leans {
             steps.map(|(point, before)| (-(point.time_s - before.time_s) / GUST_S).exp()).collect();
         Self { points, decay, aloft }
     }
+
+    /// Minus the logarithm of their likelihood, without its constant: each lean is the law's in the mean wind, and gusts
+    /// change it by the law's slopes there. (The other way round, from leans to the wind, a law without a linear part has
+    /// no slope where a lean is small.) `sizes` are the standard deviations of the gusts along both axes, of the growth of
+    /// the wind with height, and of what else lasts; `more` is what the latter change a lean, rad, by.
+    pub(super) fn misfit_nats<const N: usize>(
+        &self,
+        of: &InAir,
+        sizes: [f64; N],
+        more: impl Fn(&Point, f64) -> [f64; N],
+    ) -> f64 {
+        let mut gusts = Gusts::new(sizes);
+        for (point, (decay, aloft)) in self.points.iter().zip(self.decay.iter().zip(&self.aloft)) {
+            let [vx, vy, climb_mps] = point.velocity_mps;
+            let air = [vx - of.mean_mps[0], vy - of.mean_mps[1]];
+            let wanted = of.law.lean(air, climb_mps);
+            let slopes = of.law.slopes(air, climb_mps);
+            let scatter =
+                if point.moves { of.scatter_rad.hypot(UNSETTLED_RAD) } else { of.scatter_rad };
+            let more_mps = of.mean_mps.map(|mean_mps| mean_mps * aloft);
+            let seen = [0, 1].map(|axis| {
+                let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
+                let mut looks_at = more(point, wanted[axis]);
+                let growth = by_air[0] * more_mps[0] + by_air[1] * more_mps[1];
+                for (place, look) in [by_air[0], by_air[1], growth].into_iter().enumerate() {
+                    looks_at[place] = look;
+                }
+                Seen {
+                    off: point.lean_rad[axis] - wanted[axis],
+                    looks_at,
+                    variance: scatter * scatter,
+                }
+            });
+            gusts.see(*decay, seen);
+        }
+        gusts.misfit_nats()
+    }
 }
 
 /// A model's law with both parts, as numbers that a search can begin with.
-fn usable(model: LeanLaw) -> LeanLaw {
+pub(super) fn usable(model: LeanLaw) -> LeanLaw {
     LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model }
 }
 
@@ -190,7 +227,7 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     let search = |drag: &f64| {
         let mut start =
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
-        let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).law);
+        let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).air.law);
         (start[0], start[1]) = (x, y);
         minimise(start, objective, |at, value| differences(objective, at, value))
     };
@@ -229,14 +266,29 @@ pub(super) fn hovering_wind(points: &[Point], law: LeanLaw) -> [f64; 2] {
     sum.map(|sum: f64| if count > 0.0 { sum / count } else { 0.0 })
 }
 
+/// A law in a mean wind, with what leans scatter by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InAir {
+    pub mean_mps: [f64; 2],
+    pub law: LeanLaw,
+    pub gust_mps: f64,
+    pub scatter_rad: f64,
+}
+
+impl InAir {
+    /// Twice the nats that its gusts and scatter cost for being other than usual.
+    pub(super) fn unusual(&self) -> f64 {
+        let gusts = (self.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln();
+        let scatter = (self.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln();
+        gusts * gusts + scatter * scatter
+    }
+}
+
 /// What is fitted, in natural units.
 struct Candidate {
-    mean_mps: [f64; 2],
-    law: LeanLaw,
+    air: InAir,
     /// Quadratic part of the law without a body that the model lacks, rad/(m/s)².
     square: f64,
-    gust_mps: f64,
-    scatter_rad: f64,
 }
 
 impl Candidate {
@@ -246,50 +298,22 @@ impl Candidate {
             Lacks::Rotors => LeanLaw { linear: at[DRAG] * UNITS[DRAG], square, ..model },
             Lacks::Body => LeanLaw { square, ..model }.with_body(at[DRAG] * BODY_UNIT),
         };
-        Self {
-            mean_mps: [at[0], at[1]],
-            law,
-            square,
-            gust_mps: at[4].exp(),
-            scatter_rad: at[5].exp(),
-        }
+        let (gust_mps, scatter_rad) = (at[4].exp(), at[5].exp());
+        Self { air: InAir { mean_mps: [at[0], at[1]], law, gust_mps, scatter_rad }, square }
     }
 }
 
-/// Minus the logarithm of the posterior density, without its constant: each lean is the law's in the mean
-/// wind, and gusts change it by the law's slopes there. (The other way round, from leans to the wind, a law
-/// without a linear part has no slope where a lean is small.)
+/// Minus the logarithm of the posterior density, without its constant.
 fn misfit(leans: &Leans, at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> f64 {
     let of = Candidate::of(at, model, lacks);
-    let mut gusts = Gusts::new(of.gust_mps, SHEAR);
-    for (point, (decay, aloft)) in leans.points.iter().zip(leans.decay.iter().zip(&leans.aloft)) {
-        let [vx, vy, climb_mps] = point.velocity_mps;
-        let air = [vx - of.mean_mps[0], vy - of.mean_mps[1]];
-        let wanted = of.law.lean(air, climb_mps);
-        let slopes = of.law.slopes(air, climb_mps);
-        let scatter =
-            if point.moves { of.scatter_rad.hypot(UNSETTLED_RAD) } else { of.scatter_rad };
-        let more_mps = of.mean_mps.map(|mean_mps| mean_mps * aloft);
-        let seen = [0, 1].map(|axis| {
-            let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
-            Seen {
-                off: point.lean_rad[axis] - wanted[axis],
-                looks_at: [by_air[0], by_air[1], by_air[0] * more_mps[0] + by_air[1] * more_mps[1]],
-                variance: scatter * scatter,
-            }
-        });
-        gusts.see(*decay, seen);
-    }
     let square = |value: f64| value * value;
     let drag = match lacks {
-        Lacks::Rotors => (of.law.linear - model.linear) / LINEAR_DOUBT,
+        Lacks::Rotors => (of.air.law.linear - model.linear) / LINEAR_DOUBT,
         Lacks::Body => at[DRAG] * BODY_UNIT / BODY_DOUBT,
     };
-    let known = square((of.square.max(1e-7) / model.square).ln() / SQUARE_DOUBT)
-        + square(drag)
-        + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
-        + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln());
-    gusts.misfit_nats() + 0.5 * known
+    let known = square((of.square.max(1e-7) / model.square).ln() / SQUARE_DOUBT) + square(drag);
+    let sizes = [of.air.gust_mps, of.air.gust_mps, SHEAR];
+    leans.misfit_nats(&of.air, sizes, |_, _| [0.0; 3]) + 0.5 * (known + of.air.unusual())
 }
 
 /// Cost of a drag by which a drone would lean against the wind, nats.

@@ -27,6 +27,7 @@ mod kept;
 mod lean;
 mod lean_channel;
 mod lean_fit;
+mod lean_misfit;
 pub mod left_out;
 mod make;
 mod map_gain;

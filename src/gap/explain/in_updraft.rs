@@ -265,7 +265,9 @@ impl Search<'_> {
             gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
         }
         let share = updraft_mps / UPDRAFT_DOUBT_MPS;
-        likely.filter(|likely| likely.is_finite()).map(|likely| likely - 0.5 * share * share)
+        let leans_nats = there.lean_misfit_nats();
+        let known_nats = leans_nats + 0.5 * share * share;
+        likely.filter(|likely| likely.is_finite()).map(|likely| likely - known_nats)
     }
 
     /// Whether the flight may have been in another updraft. A table has the climb that was flown, not the one

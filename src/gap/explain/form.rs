@@ -1,0 +1,114 @@
+//! Which of its forms an effect has that was found.
+
+use super::super::candidates::set;
+use super::super::decide::CLASS_NATS;
+use super::super::error::GapError;
+use super::Search;
+use crate::effects::select::value_of;
+use crate::effects::{Definition, Parameter, Role, Sought, find};
+use crate::vehicle::Vehicle;
+
+impl Search<'_> {
+    /// Gives the effect that was found last its other forms, and keeps that with which the model, flown and fitted,
+    /// explains most. By steady states alone one can be as good as another with which no drone flies like this.
+    pub(super) fn chooses_form(&mut self) -> Result<(), GapError> {
+        let Some(step) = self.found.steps.last() else { return Ok(()) };
+        let Some(effect) = step.finding.effects().first().and_then(|name| find(name)) else {
+            return Ok(());
+        };
+        let definition = effect.definition();
+        if !self.found.parameters.iter().any(|one| one.effect == definition.name) {
+            return Ok(());
+        }
+        for (form, value) in others(definition, &self.found.vehicle) {
+            let is_usual = |value: f64| value == (form.default)(self.vehicle);
+            let now = value_of(&self.found.vehicle, definition.name, form.name);
+            let needed_nats = match (now.is_some_and(is_usual), is_usual(value)) {
+                (true, false) => CLASS_NATS,
+                (false, true) => -CLASS_NATS,
+                _ => 0.0,
+            };
+            let before = (self.comparison.clone(), self.found.clone());
+            set(&mut self.found.vehicle, definition.name, form.name, value);
+            let is_better = match self.flies_fitted() {
+                Err(error) if error.is_not_flown() => false,
+                flown => {
+                    flown?;
+                    self.found.explains()? > before.1.explains()? + needed_nats
+                }
+            };
+            if !is_better {
+                (self.comparison, self.found) = before;
+            }
+        }
+        Ok(())
+    }
+
+    /// Flies the model, fits what was found, and flies it so.
+    fn flies_fitted(&mut self) -> Result<(), GapError> {
+        for _ in 0..2 {
+            self.comparison = self.against_model()?;
+            self.found.refit(&self.comparison)?;
+        }
+        self.found.comparison = self.comparison.clone();
+        Ok(())
+    }
+}
+
+/// The forms of an effect that a vehicle's has not, where they are a choice.
+fn others<'a>(definition: &'a Definition, vehicle: &Vehicle) -> Vec<(&'a Parameter, f64)> {
+    let Sought::Shape { shape: Some((name, values)), .. } = &definition.sought else {
+        return Vec::new();
+    };
+    let is_choice = |role: Option<Role>| role.is_some_and(Role::is_choice);
+    let Some(form) = definition.parameter(name).filter(|form| is_choice(form.role)) else {
+        return Vec::new();
+    };
+    let now = value_of(vehicle, definition.name, form.name);
+    values.iter().filter(|value| now != Some(**value)).map(|value| (form, *value)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::compare::{Comparison, Simulated};
+    use super::super::super::model_flights::ModelFlights;
+    use super::super::super::{refine, trial};
+    use super::super::Options;
+    use super::super::tests::begun;
+    use super::*;
+    use crate::effects::{Model, Signals};
+
+    /// A drone whose rotors lose thrust to the climb, with momentum theory's change of the induced velocity or without.
+    fn with(induced: f64) -> Vehicle {
+        let mut vehicle = trial::vehicle();
+        set(&mut vehicle, "rotor-inflow", "inflow_share", 0.4);
+        set(&mut vehicle, "rotor-inflow", "induced", induced);
+        vehicle
+    }
+
+    #[test]
+    fn the_form_that_explains_more_when_it_is_flown_is_kept() {
+        let chosen = |flew: f64, found: f64| {
+            let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+            let [flown, known] = [&with(flew), &vehicle].map(|one| Model::of(one).unwrap());
+            let data = trial::data(4, |drone, bin| {
+                let height = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+                let signals = Signals { climb_mps: bin.climb_mps(), ..height };
+                let ripple_us =
+                    0.1 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+                flown.pulse_us(&signals) - known.pulse_us(&signals) + ripple_us
+            });
+            let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+            let (options, flights) = (Options::default(), ModelFlights::default());
+            let mut search = begun(&data, &vehicle, (&simulated, &options, &flights), comparison);
+            search.found.vehicle = with(found);
+            search.found.parameters.extend(refine::size_of("rotor-inflow", "inflow_share"));
+            search.found.steps.push(trial::step(trial::name("rotor-inflow"), 20.0, &[]));
+            search.flies_fitted().unwrap();
+            search.chooses_form().unwrap();
+            value_of(&search.found.vehicle, "rotor-inflow", "induced")
+        };
+        assert_eq!([chosen(1.0, 0.0), chosen(1.0, 1.0)], [Some(1.0); 2]);
+        assert_eq!([chosen(0.0, 0.0), chosen(0.0, 1.0)], [Some(0.0); 2]);
+    }
+}
