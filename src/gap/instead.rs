@@ -11,7 +11,8 @@ use super::decide::{CLASS_NATS, margin_nats};
 use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Only, Options};
-use super::verdict::{Finding, Step};
+use super::search::FLOOR_NATS;
+use super::verdict::{Finding, Step, is_strong_wind};
 use crate::effects::{Class, LIBRARY, Role, Signal, Sought, find};
 
 /// Effects that are flown in place of what was found, at most. Chosen to bound the time.
@@ -60,17 +61,12 @@ pub(super) fn fewer_instead(
         is_alike.then_some(Ended { found, nats, only })
     };
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
-    let alone = rivals(&found.steps, by_leans);
+    let effects = rivals(&found.steps, by_leans);
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
-    let by = |only: Only| Options {
-        only: Some(only),
-        most_steps: 1,
-        replicates: 0,
-        rest: false,
-        ..*options
-    };
-    let alone = alone.into_iter().map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats }));
-    let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
+    let by = |only: Only| alone(options, only);
+    let each =
+        effects.into_iter().map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats }));
+    let all: Vec<Options> = std::iter::once(nothing).chain(each).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     let Decided { ended, names } = decided(Ended { found, nats, only: None }, others);
@@ -83,6 +79,43 @@ pub(super) fn fewer_instead(
         step.finding = of(names, &step.finding);
     }
     Ok(found)
+}
+
+/// Drags by which a drone reads another wind from its leans.
+const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
+
+/// A drag in place of nothing, where it explains a flight clearly better in the wind that its leans tell then: in a strong wind
+/// that was read without it, what nobody knows of that wind hides it. `flown` searches with these options.
+///
+/// # Errors
+/// Effects of a vehicle that are not valid.
+pub(super) fn drag_after_all(
+    found: Found,
+    options: &Options,
+    flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
+) -> Result<Found, GapError> {
+    let wind = &found.comparison.wind;
+    let is_misread = wind.measured.is_none() && is_strong_wind(wind.mean_mps);
+    if !found.steps.is_empty() || !options.updraft || !is_misread {
+        return Ok(found);
+    }
+    let bins = found.comparison.data.bins_of_groups();
+    let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + FLOOR_NATS);
+    let explained = |role: &Role| -> Option<(f64, Found)> {
+        let only = Only { effect: role.place()?.name(), updraft_mps, beaten_nats };
+        let there = flown(&alone(options, only)).ok()?;
+        let is_alike = there.steps.len() == 1 && there.comparison.data.bins_of_groups() == bins;
+        let nats = there.explains().ok().filter(|nats| *nats > beaten_nats)?;
+        is_alike.then_some((nats, there))
+    };
+    let better = WIND_READERS.par_iter().filter_map(explained);
+    let best = better.reduce_with(|one, other| if other.0 > one.0 { other } else { one });
+    Ok(best.map_or(found, |(_, there)| there))
+}
+
+/// Options of a search for one effect alone.
+fn alone(options: &Options, only: Only) -> Options {
+    Options { only: Some(only), most_steps: 1, replicates: 0, rest: false, ..*options }
 }
 
 /// Effects of the library that explained much where something was found, those that explained most first.
@@ -248,9 +281,13 @@ fn of(names: Vec<String>, finding: &Finding) -> Finding {
 
 #[cfg(test)]
 mod tests {
+    use super::super::candidates::set;
+    use super::super::compare::{Comparison, Simulated};
     use super::super::trial;
     use super::super::verdict::Rest;
     use super::*;
+    use crate::effects::{Model, Signals};
+    use crate::vehicle::Vehicle;
 
     /// A search that ended with these effects, the classes among them written with a slash.
     fn ended(nats: f64, findings: &[&str]) -> Ended {
@@ -419,5 +456,43 @@ mod tests {
         assert_eq!(instead(5.0), ["parasitic-drag/climb"]);
         assert_eq!(instead(7.0), ["parasitic-drag"]);
         assert!(!instead(-1.0).concat().contains("parasitic-drag"));
+    }
+
+    #[test]
+    fn a_drag_by_which_a_strong_wind_was_misread_stands_in_place_of_nothing() {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let mut larger = vehicle.clone();
+        set(&mut larger, "parasitic-drag", "vertical_m2", 0.08);
+        let [flew, known] = [&larger, &vehicle].map(|one| Model::of(one).unwrap());
+        let data = trial::data(4, |drone, bin| {
+            let signals = Signals {
+                climb_mps: bin.climb_mps(),
+                height_m: 30.0,
+                density_ratio: 1.0,
+                ..Signals::default()
+            };
+            let ripple_us = 0.3 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+            flew.pulse_us(&signals) - known.pulse_us(&signals) + ripple_us
+        });
+        let found = |vehicle: &Vehicle| {
+            Found::nothing(Comparison::new(&data, vehicle, &simulated, None).unwrap())
+        };
+        let told = |by: &Vehicle, wind_mps: f64, options: &Options| {
+            let mut nothing = found(&vehicle);
+            nothing.comparison.wind.mean_mps = [wind_mps, 0.0];
+            let flown = |options: &Options| {
+                let mut there = found(by);
+                there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
+                Ok(there)
+            };
+            let there = drag_after_all(nothing, options, flown).unwrap();
+            !there.steps.is_empty()
+        };
+        let options = Options::default();
+        assert!(told(&larger, 9.0, &options));
+        assert!(!told(&larger, 5.0, &options), "nothing hides it");
+        assert!(!told(&vehicle, 9.0, &options), "it explains no more than nothing does");
+        let still_air = Options { updraft: false, ..options };
+        assert!(!told(&larger, 9.0, &still_air), "a table is not flown again");
     }
 }

@@ -5,7 +5,7 @@ use super::data::Data;
 use super::error::GapError;
 use super::explain::{Found, Options, lacked_drag, search};
 use super::heldout::Case;
-use super::instead::fewer_instead;
+use super::instead::{drag_after_all, fewer_instead};
 use super::model_flights::ModelFlights;
 use super::search::FAR_NATS;
 use super::verdict::{Finding, Gap, Step};
@@ -73,9 +73,15 @@ impl Question<'_> {
                 (found, gap) = (still, without);
             }
         }
+        let flown = |options: &Options| self.search(train, options);
+        if found.steps.is_empty() {
+            found = drag_after_all(found, self.options, flown)?;
+            if !found.steps.is_empty() {
+                gap = self.case(&found).gap(train, held)?;
+            }
+        }
         let before = found.steps.clone();
         if !found.steps.is_empty() {
-            let flown = |options: &Options| self.search(train, options);
             let by_leans = lacked_drag([self.original, self.repaired]);
             found = fewer_instead(found, self.options, by_leans, flown)?;
             if found.steps != before {
