@@ -16,7 +16,7 @@ const SQUARE_DOUBT: f64 = 0.3;
 const FORM_SHARE: f64 = 0.05;
 /// Share of their likelihood, in nats, that leans count with. Leans of one bin and the next err alike, whatever a line and a
 /// parabola take up: in 18 foreign flights in less than 3 m/s of wind, the updraft in which they were likeliest was off by
-/// 2.0 times its error (rms).
+/// 1.7 times its error (rms).
 const COUNTED: f64 = 0.25;
 /// Searches from where the last one ended, at most. Numerical.
 const SEARCHES: usize = 3;
