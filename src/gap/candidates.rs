@@ -282,9 +282,8 @@ fn of_library(
                     Role::BodyDragSide.set(&mut other, sides * value);
                 }
                 let form = sides.or(shape.map(|(_, value)| value));
-                let is_unusual =
-                    shape.is_some_and(|(name, value)| is_unusual(definition, vehicle, name, value));
-                let price_nats = if is_unusual { CLASS_NATS } else { 0.0 };
+                let price_nats = shape
+                    .map_or(0.0, |(name, value)| form_price_nats(definition, vehicle, name, value));
                 let variant = |variant: Variant| Variant { form, price_nats, ..variant };
                 variants.extend(base.forms(&other, value).into_iter().map(variant));
             }
@@ -308,12 +307,18 @@ fn of_library(
     Ok(found)
 }
 
-/// Whether a form is another than the usual one of two: the size of an effect goes with it, and where a flight does not
+/// Nats that a form must explain beyond the usual one of two: the size of an effect goes with it, and where a flight does not
 /// tell them apart it is that of the usual form.
-fn is_unusual(definition: &Definition, vehicle: &Vehicle, name: &str, value: f64) -> bool {
-    definition.parameter(name).is_some_and(|parameter| {
+pub(super) fn form_price_nats(
+    definition: &Definition,
+    vehicle: &Vehicle,
+    name: &str,
+    value: f64,
+) -> f64 {
+    let is_unusual = definition.parameter(name).is_some_and(|parameter| {
         parameter.role.is_some_and(Role::is_choice) && value != (parameter.default)(vehicle)
-    })
+    });
+    if is_unusual { CLASS_NATS } else { 0.0 }
 }
 
 /// The share of momentum drag that acts along the rotors' axis, as in ArduPilot's own simulator.

@@ -33,6 +33,21 @@ struct Ended {
     only: Option<Only>,
 }
 
+impl Ended {
+    /// A search with these options; `None`: it found more or less than was asked for, or not in the same bins.
+    fn of(
+        options: &Options,
+        bins: &[usize],
+        flown: impl Fn(&Options) -> Result<Found, GapError>,
+    ) -> Option<Self> {
+        let found = flown(options).ok()?;
+        let is_alike = found.steps.len() == options.most_steps
+            && found.comparison.data.bins_of_groups() == bins;
+        let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
+        is_alike.then_some(Self { found, nats, only: options.only })
+    }
+}
+
 /// What is to be told: a search that ended, and the names of its finding if that is the only one.
 struct Decided {
     ended: Ended,
@@ -52,14 +67,7 @@ pub(super) fn fewer_instead(
     flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
 ) -> Result<Found, GapError> {
     let bins = found.comparison.data.bins_of_groups();
-    let ended = |options: &Options| -> Option<Ended> {
-        let found = flown(options).ok()?;
-        let only = options.only;
-        let is_alike = found.steps.len() == options.most_steps
-            && found.comparison.data.bins_of_groups() == bins;
-        let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
-        is_alike.then_some(Ended { found, nats, only })
-    };
+    let ended = |options: &Options| Ended::of(options, &bins, &flown);
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let effects = rivals(&found.steps, by_leans);
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
@@ -101,16 +109,13 @@ pub(super) fn drag_after_all(
     }
     let bins = found.comparison.data.bins_of_groups();
     let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + FLOOR_NATS);
-    let explained = |role: &Role| -> Option<(f64, Found)> {
+    let ended = |role: &Role| {
         let only = Only { effect: role.place()?.name(), updraft_mps, beaten_nats };
-        let there = flown(&alone(options, only)).ok()?;
-        let is_alike = there.steps.len() == 1 && there.comparison.data.bins_of_groups() == bins;
-        let nats = there.explains().ok().filter(|nats| *nats > beaten_nats)?;
-        is_alike.then_some((nats, there))
+        Ended::of(&alone(options, only), &bins, &flown)
     };
-    let better = WIND_READERS.par_iter().filter_map(explained);
-    let best = better.reduce_with(|one, other| if other.0 > one.0 { other } else { one });
-    Ok(best.map_or(found, |(_, there)| there))
+    let better = WIND_READERS.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
+    let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
+    Ok(best.map_or(found, |best| best.found))
 }
 
 /// Options of a search for one effect alone.

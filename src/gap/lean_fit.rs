@@ -21,7 +21,7 @@ const LINEAR_DOUBT: f64 = 0.03;
 /// the rotors, the deepest was found from nearly none in one, and from the usual ones in the other.
 const USUAL_LINEAR: [f64; 3] = [0.001, 0.01, 0.03];
 /// Searches from where the last one ended, at most: each has only so many steps. Numerical.
-const SEARCHES: usize = 4;
+const AGAIN: usize = 3;
 /// A search that gains less was at the bottom already, nats. Numerical.
 const BOTTOM_NATS: f64 = 0.02;
 /// Prior median of the gusts, m/s: 15 % of 1 to 6 m/s of wind are 0.15 to 0.9.
@@ -240,9 +240,16 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     };
     let ends: Vec<([f64; COUNT], f64)> = starts.par_iter().map(search).collect();
     let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
-    let mut best = best.unwrap_or(([0.0; COUNT], f64::INFINITY));
-    for _ in 1..SEARCHES {
-        let next = minimise(best.0, objective, |at, value| differences(objective, at, value));
+    bottom(best.unwrap_or(([0.0; COUNT], f64::INFINITY)), objective)
+}
+
+/// The bottom under a place with its misfit, nats: searched for again from where each search ends.
+pub(super) fn bottom<const N: usize>(
+    mut best: ([f64; N], f64),
+    objective: impl Fn(&[f64; N]) -> f64,
+) -> ([f64; N], f64) {
+    for _ in 0..AGAIN {
+        let next = minimise(best.0, &objective, |at, value| differences(&objective, at, value));
         let gained = best.1 - next.1;
         if gained > 0.0 {
             best = next;

@@ -3,8 +3,10 @@
 //! whatever the pulses tell.
 
 use super::lean::LeanLaw;
-use super::lean_fit::{GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, hovering_wind, usable};
-use crate::numeric::{differences, minimise, most};
+use super::lean_fit::{
+    GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, bottom, hovering_wind, usable,
+};
+use crate::numeric::most;
 
 /// Standard deviation of the linear part of a model's law: as a share, as bodies may differ from the model by some tenths,
 /// and rad/(m/s). Chosen.
@@ -18,10 +20,6 @@ const FORM_SHARE: f64 = 0.05;
 /// parabola take up: in 18 foreign flights in less than 3 m/s of wind, the updraft in which they were likeliest was off by
 /// 1.7 times its error (rms).
 const COUNTED: f64 = 0.25;
-/// Searches from where the last one ended, at most. Numerical.
-const SEARCHES: usize = 3;
-/// A search that gains less was at the bottom already, nats. Numerical.
-const BOTTOM_NATS: f64 = 0.02;
 /// Variables of the fit: mean wind (two), what the law's linear and quadratic parts differ by from the model's in standard
 /// deviations, and the logarithms of gusts and scatter.
 const COUNT: usize = 6;
@@ -51,18 +49,9 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
         likely + 0.5 * (at[2] * at[2] + at[3] * at[3] + air.unusual())
     };
     let [x, y] = hovering_wind(&leans.points, model);
-    let mut best = ([x, y, 0.0, 0.0, GUST_MPS.ln(), SCATTER_RAD.ln()], f64::INFINITY);
-    for _ in 0..SEARCHES {
-        let next = minimise(best.0, objective, |at, value| differences(objective, at, value));
-        let gained = best.1 - next.1;
-        if gained > 0.0 {
-            best = next;
-        }
-        if gained < BOTTOM_NATS {
-            break;
-        }
-    }
-    if best.1.is_finite() { COUNTED * best.1 } else { 0.0 }
+    let start = [x, y, 0.0, 0.0, GUST_MPS.ln(), SCATTER_RAD.ln()];
+    let (_, nats) = bottom((start, f64::INFINITY), objective);
+    if nats.is_finite() { COUNTED * nats } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Which of its forms an effect has that was found.
 
-use super::super::candidates::set;
-use super::super::decide::CLASS_NATS;
+use super::super::candidates::{form_price_nats, set};
 use super::super::error::GapError;
 use super::Search;
 use crate::effects::select::value_of;
@@ -21,36 +20,20 @@ impl Search<'_> {
             return Ok(());
         }
         for (form, value) in others(definition, &self.found.vehicle) {
-            let is_usual = |value: f64| value == (form.default)(self.vehicle);
+            let price_nats =
+                |value: f64| form_price_nats(definition, self.vehicle, form.name, value);
             let now = value_of(&self.found.vehicle, definition.name, form.name);
-            let needed_nats = match (now.is_some_and(is_usual), is_usual(value)) {
-                (true, false) => CLASS_NATS,
-                (false, true) => -CLASS_NATS,
-                _ => 0.0,
-            };
+            let needed_nats = price_nats(value) - now.map_or(0.0, price_nats);
             let before = (self.comparison.clone(), self.found.clone());
             set(&mut self.found.vehicle, definition.name, form.name, value);
-            let is_better = match self.flies_fitted() {
+            let is_better = match self.is_fitted_here() {
                 Err(error) if error.is_not_flown() => false,
-                flown => {
-                    flown?;
-                    self.found.explains()? > before.1.explains()? + needed_nats
-                }
+                fitted => fitted? && self.found.explains()? > before.1.explains()? + needed_nats,
             };
             if !is_better {
                 (self.comparison, self.found) = before;
             }
         }
-        Ok(())
-    }
-
-    /// Flies the model, fits what was found, and flies it so.
-    fn flies_fitted(&mut self) -> Result<(), GapError> {
-        for _ in 0..2 {
-            self.comparison = self.against_model()?;
-            self.found.refit(&self.comparison)?;
-        }
-        self.found.comparison = self.comparison.clone();
         Ok(())
     }
 }
@@ -104,7 +87,7 @@ mod tests {
             search.found.vehicle = with(found);
             search.found.parameters.extend(refine::size_of("rotor-inflow", "inflow_share"));
             search.found.steps.push(trial::step(trial::name("rotor-inflow"), 20.0, &[]));
-            search.flies_fitted().unwrap();
+            assert!(search.is_fitted_here().unwrap());
             search.chooses_form().unwrap();
             value_of(&search.found.vehicle, "rotor-inflow", "induced")
         };

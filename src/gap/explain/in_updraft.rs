@@ -90,7 +90,7 @@ impl Search<'_> {
     }
 
     /// Fits what was found in the present updraft, and flies the model there; whether it flies the same bins.
-    fn is_fitted_here(&mut self) -> Result<bool, GapError> {
+    pub(super) fn is_fitted_here(&mut self) -> Result<bool, GapError> {
         let bins = self.found.comparison.data.bins_of_groups();
         for is_refitted in [false, true] {
             if is_refitted {
