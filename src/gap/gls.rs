@@ -1,6 +1,8 @@
 //! Generalised least squares with the noise's covariance: what regressors explain, with the shared
 //! air, drones' offsets and scatter partialled out exactly.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::numeric::{extent, mean};
@@ -8,7 +10,7 @@ use crate::numeric::{extent, mean};
 use super::memory::{Digest, Memory};
 use super::noise::{COUNT, GroupPattern, Hyper, Whitener};
 use super::response::Response;
-use crate::numeric::minimise_known;
+use crate::numeric::{Inverse, Least, minimise_known};
 
 /// Values of all drones, by group, drone and bin.
 pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
@@ -207,7 +209,42 @@ impl White {
 }
 
 /// Noise that was fitted: of several flights' searches.
-static FITTED: Memory<Hyper> = Memory::of(20_000);
+static FITTED: Memory<Start> = Memory::of(20_000);
+
+/// Where a fit of the noise begins.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Start {
+    /// Parameters of the noise.
+    pub hyper: Hyper,
+    /// How the likelihood bends there, by a problem that is much like the one to be fitted.
+    inverse: Option<Arc<Inverse<COUNT>>>,
+}
+
+impl Start {
+    /// All that a fit follows from it.
+    pub(super) fn add_to(&self, digest: &mut Digest) {
+        digest.add_all(&self.hyper.0);
+        digest.add_all(self.inverse.iter().flat_map(|inverse| inverse.iter().flatten()));
+    }
+}
+
+impl From<Hyper> for Start {
+    fn from(hyper: Hyper) -> Self {
+        Self { hyper, inverse: None }
+    }
+}
+
+impl From<&Self> for Start {
+    fn from(start: &Self) -> Self {
+        start.clone()
+    }
+}
+
+impl From<&Solution> for Start {
+    fn from(solution: &Solution) -> Self {
+        Self { hyper: solution.hyper, inverse: solution.inverse.clone() }
+    }
+}
 
 /// A problem: measured against the model, and the regressors that are in the model already.
 #[derive(Clone, Debug)]
@@ -290,15 +327,16 @@ impl<'a> Problem<'a> {
     }
 
     /// Most probable noise from a start, with everything linear at its best.
-    pub(super) fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
+    pub(super) fn fit(&self, start: impl Into<Start>, likelihood: Likelihood) -> Solution {
+        let start = start.into();
         let mut digest = self.digest();
-        digest.add_all(&start.0);
+        start.add_to(&mut digest);
         digest.add(u64::from(likelihood == Likelihood::Restricted));
-        if let Some(hyper) = FITTED.get(digest) {
-            return self.at(&hyper);
+        if let Some(Start { hyper, inverse }) = FITTED.get(digest) {
+            return Solution { inverse, ..self.at(&hyper) };
         }
-        let fitted = self.fitted(start, likelihood);
-        FITTED.keep(digest, fitted.hyper);
+        let fitted = self.fitted(&start, likelihood);
+        FITTED.keep(digest, Start::from(&fitted));
         fitted
     }
 
@@ -335,7 +373,7 @@ impl<'a> Problem<'a> {
         digest
     }
 
-    fn fitted(&self, start: Hyper, likelihood: Likelihood) -> Solution {
+    fn fitted(&self, start: &Start, likelihood: Likelihood) -> Solution {
         let objective = |at: &[f64; COUNT]| {
             let solution = self.at(&Hyper(*at));
             let likely = solution.log_likelihood(likelihood) + solution.hyper.log_prior();
@@ -348,7 +386,9 @@ impl<'a> Problem<'a> {
             }
             slopes
         };
-        minimise_known(start.0, objective, slopes).2
+        let Least { known, inverse, .. } =
+            minimise_known(start.hyper.0, start.inverse.as_deref(), objective, slopes);
+        Solution { inverse: Some(Arc::new(inverse)), ..known }
     }
 }
 
@@ -376,6 +416,8 @@ pub(super) struct Solution {
     pub chi2: f64,
     /// Degrees of freedom: number of observations less that of regressors.
     pub freedom: f64,
+    /// How the likelihood bends by the noise, if that was fitted.
+    inverse: Option<Arc<Inverse<COUNT>>>,
 }
 
 /// What a regressor would gain at fixed noise.
@@ -404,7 +446,8 @@ impl Solution {
         let explained: f64 = beta.iter().zip(right.iter()).map(|(beta, right)| beta * right).sum();
         let total = products[(count, count)];
         let freedom = (y.means.len() + y.deviations.len()) as f64 - count as f64;
-        Self { hyper, whitener, y, columns, factor, beta, chi2: total - explained, freedom }
+        let chi2 = total - explained;
+        Self { hyper, whitener, y, columns, factor, beta, chi2, freedom, inverse: None }
     }
 
     /// Logarithm of the likelihood, without its constant; −∞ where regressors are collinear.

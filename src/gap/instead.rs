@@ -10,7 +10,7 @@ use super::contest::PRODUCT_NATS;
 use super::decide::{CLASS_NATS, margin_nats};
 use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
-use super::explain::{Found, Only, Options};
+use super::explain::{Found, Left, Only, Options, Searched, Setting};
 use super::search::FLOOR_NATS;
 use super::verdict::{Finding, Step, is_strong_wind};
 use crate::effects::{Class, LIBRARY, Role, Signal, Sought, find};
@@ -31,6 +31,8 @@ struct Ended {
     nats: f64,
     /// The effect that alone was searched for, if it was one.
     only: Option<Only>,
+    /// What was left to be looked for.
+    left: Option<Left>,
 }
 
 impl Ended {
@@ -38,13 +40,14 @@ impl Ended {
     fn of(
         options: &Options,
         bins: &[usize],
-        flown: impl Fn(&Options) -> Result<Found, GapError>,
+        flown: impl Fn(&Options) -> Result<Searched, GapError>,
     ) -> Option<Self> {
-        let found = flown(options).ok()?;
+        let Searched { found, left } = flown(options).ok()?;
         let is_alike = found.steps.len() == options.most_steps
             && found.comparison.data.bins_of_groups() == bins;
-        let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
-        is_alike.then_some(Self { found, nats, only: options.only })
+        let nats = || found.explains().ok().filter(|nats| nats.is_finite());
+        let nats = is_alike.then(nats).flatten()?;
+        Some(Self { found, nats, only: options.only, left })
     }
 }
 
@@ -55,8 +58,7 @@ struct Decided {
 }
 
 /// What explains a flight best: what was found, one effect in its place, or nothing. Effects that explain it as well as a
-/// single finding are told as a class with it. `flown` searches with these options; `by_leans` says whether leans alone
-/// told a drag of the rotors.
+/// single finding are told as a class with it. `by_leans` says whether leans alone told a drag of the rotors.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
@@ -64,10 +66,11 @@ pub(super) fn fewer_instead(
     found: Found,
     options: &Options,
     by_leans: bool,
-    flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
+    setting: Setting<'_>,
 ) -> Result<Found, GapError> {
     let bins = found.comparison.data.bins_of_groups();
-    let ended = |options: &Options| Ended::of(options, &bins, &flown);
+    let flown = |options: &Options| setting.search(options);
+    let ended = |options: &Options| Ended::of(options, &bins, flown);
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let effects = rivals(&found.steps, by_leans);
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
@@ -77,11 +80,13 @@ pub(super) fn fewer_instead(
     let all: Vec<Options> = std::iter::once(nothing).chain(each).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
-    let Decided { ended, names } = decided(Ended { found, nats, only: None }, others);
-    let mut found = match ended.only {
+    let Decided { ended, names } = decided(Ended { found, nats, only: None, left: None }, others);
+    let mut found = match (ended.only, ended.left) {
         // What is left beside it is sought only now.
-        Some(only) => flown(&Options { rest: true, ..by(only) })?,
-        None => ended.found,
+        (Some(only), Some(left)) => {
+            setting.look_for_rest(&Options { rest: true, ..by(only) }, left)?
+        }
+        _ => ended.found,
     };
     if let [step] = &mut found.steps[..] {
         step.finding = of(names, &step.finding);
@@ -100,7 +105,7 @@ const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 pub(super) fn drag_after_all(
     found: Found,
     options: &Options,
-    flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
+    flown: impl Fn(&Options) -> Result<Searched, GapError> + Sync,
 ) -> Result<Found, GapError> {
     let wind = &found.comparison.wind;
     let is_misread = wind.measured.is_none() && is_strong_wind(wind.mean_mps);
@@ -295,7 +300,7 @@ mod tests {
         let data = trial::data(2, |_, _| 0.0);
         let mut found = Found::nothing(trial::comparison(&data));
         found.steps = findings.iter().map(|names| step(names, 20.0, &[])).collect();
-        Ended { found, nats, only: None }
+        Ended { found, nats, only: None, left: None }
     }
 
     fn step(names: &str, gain_nats: f64, rivals: &[(&str, f64)]) -> Step {
@@ -470,7 +475,7 @@ mod tests {
             let flown = |options: &Options| {
                 let mut there = Found::nothing(trial::comparison(&data));
                 there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
-                Ok(there)
+                Ok(Searched { found: there, left: None })
             };
             let there = drag_after_all(nothing, options, flown).unwrap();
             !there.steps.is_empty()

@@ -3,7 +3,7 @@
 use super::compare::{Comparison, Simulated};
 use super::data::Data;
 use super::error::GapError;
-use super::explain::{Found, Options, lacked_drag, search};
+use super::explain::{Found, Options, Setting, lacked_drag};
 use super::heldout::Case;
 use super::instead::{drag_after_all, fewer_instead};
 use super::model_flights::ModelFlights;
@@ -73,9 +73,9 @@ impl Question<'_> {
                 (found, gap) = (still, without);
             }
         }
-        let flown = |options: &Options| self.search(train, options);
+        let setting = self.setting(train);
         if found.steps.is_empty() {
-            found = drag_after_all(found, self.options, flown)?;
+            found = drag_after_all(found, self.options, |options| setting.search(options))?;
             if !found.steps.is_empty() {
                 gap = self.case(&found).gap(train, held)?;
             }
@@ -83,7 +83,7 @@ impl Question<'_> {
         let before = found.steps.clone();
         if !found.steps.is_empty() {
             let by_leans = lacked_drag([self.original, self.repaired]);
-            found = fewer_instead(found, self.options, by_leans, flown)?;
+            found = fewer_instead(found, self.options, by_leans, setting)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;
             }
@@ -109,9 +109,9 @@ impl Question<'_> {
         Ok(in_air(found.updraft_mps)? > WORSE * in_air(0.0)?)
     }
 
-    fn search(self, train: &Data, options: &Options) -> Result<Found, GapError> {
-        let models = [self.original, self.repaired];
-        search(train, models, self.simulated, self.plan, options, self.flights)
+    fn setting<'a>(&'a self, data: &'a Data) -> Setting<'a> {
+        let Self { original, repaired: vehicle, simulated, plan, flights, .. } = *self;
+        Setting { data, original, vehicle, simulated, plan, flights }
     }
 
     fn searched(
@@ -120,7 +120,7 @@ impl Question<'_> {
         held: &Data,
         options: Options,
     ) -> Result<(Found, Gap), GapError> {
-        let found = self.search(train, &options)?;
+        let found = self.setting(train).search(&options)?.found;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
     }

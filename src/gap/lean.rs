@@ -163,8 +163,9 @@ impl LeanLaw {
 
     /// The lean in horizontal air, show frame.
     pub(super) fn lean(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
-        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps - self.updraft_mps);
+        let axial_mps = climb_mps - self.updraft_mps;
         let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
+        let whole_mps = (square_mps2 + axial_mps * axial_mps).sqrt();
         let linear = self.linear + self.body_square() * whole_mps + self.cube * square_mps2;
         let load = self.load(climb_mps);
         air_mps.map(|part| (linear + self.box_square() * part.abs()) * part / load)
@@ -178,8 +179,8 @@ impl LeanLaw {
     /// Change of each axis' lean with each axis' air, rad/(m/s).
     pub(super) fn slopes(self, air_mps: [f64; 2], climb_mps: f64) -> Matrix2<f64> {
         let axial_mps = climb_mps - self.updraft_mps;
-        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(axial_mps).max(1e-6);
         let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
+        let whole_mps = (square_mps2 + axial_mps * axial_mps).sqrt().max(1e-6);
         let body = self.body_square();
         let load = self.load(climb_mps);
         Matrix2::from_fn(|row, column| {
@@ -242,7 +243,8 @@ impl LeanLaw {
 
     /// The air by leans of an unloaded law whose bent parts are taken at a speed.
     fn air_near(self, lean_rad: [f64; 2], climb_mps: f64, speed_mps: f64) -> [f64; 2] {
-        let whole_mps = speed_mps.hypot(climb_mps - self.updraft_mps);
+        let axial_mps = climb_mps - self.updraft_mps;
+        let whole_mps = (speed_mps * speed_mps + axial_mps * axial_mps).sqrt();
         let linear =
             self.linear + self.body_square() * whole_mps + self.cube * speed_mps * speed_mps;
         let square = self.box_square();

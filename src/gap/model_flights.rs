@@ -2,22 +2,23 @@
 //! begin with the same ones.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compare::Comparison;
 use super::error::GapError;
-use super::noise::{COUNT, Hyper};
+use super::explain::Seen;
+use super::gls::Start;
+use super::memory::Digest;
 
 /// What a flight of the model follows from: the comparison that tells the wind to begin with, and the updraft.
 type Flight = (bool, [u64; 7]);
-/// What its likelihood follows from beside that: the noise that is fitted from, and the gusts.
-type Start = [u64; COUNT + 1];
 
 /// What was flown so far with one model against the same logs.
 #[derive(Debug, Default)]
 pub(super) struct ModelFlights {
     flown: Mutex<BTreeMap<Flight, Comparison>>,
-    likely: Mutex<BTreeMap<(Flight, Start), Option<f64>>>,
+    likely: Mutex<BTreeMap<(Flight, Digest), Option<f64>>>,
+    seen: Mutex<BTreeMap<(Flight, Digest), Arc<Seen>>>,
 }
 
 impl ModelFlights {
@@ -44,14 +45,10 @@ impl ModelFlights {
     pub(super) fn likely(
         &self,
         (near, updraft_mps): (&Comparison, f64),
-        (hyper, gusts_mps): (Hyper, f64),
+        start: (&Start, f64),
         fit: impl FnOnce() -> Option<f64>,
     ) -> Option<f64> {
-        let mut start = [gusts_mps.to_bits(); COUNT + 1];
-        for (bits, value) in start.iter_mut().zip(hyper.0) {
-            *bits = value.to_bits();
-        }
-        let key = (flight(Some(near), updraft_mps), start);
+        let key = (flight(Some(near), updraft_mps), digest(start));
         if let Some(known) = locked(&self.likely).get(&key) {
             return *known;
         }
@@ -59,6 +56,32 @@ impl ModelFlights {
         locked(&self.likely).insert(key, likely);
         likely
     }
+
+    /// That flight as it is seen from some noise and gusts.
+    ///
+    /// # Errors
+    /// Those of `look`.
+    pub(super) fn seen(
+        &self,
+        (near, updraft_mps): (&Comparison, f64),
+        start: (&Start, f64),
+        look: impl FnOnce() -> Result<Seen, GapError>,
+    ) -> Result<Arc<Seen>, GapError> {
+        let key = (flight(Some(near), updraft_mps), digest(start));
+        if let Some(known) = locked(&self.seen).get(&key) {
+            return Ok(Arc::clone(known));
+        }
+        let seen = Arc::new(look()?);
+        locked(&self.seen).insert(key, Arc::clone(&seen));
+        Ok(seen)
+    }
+}
+
+fn digest((start, gusts_mps): (&Start, f64)) -> Digest {
+    let mut digest = Digest::new();
+    start.add_to(&mut digest);
+    digest.add_all(&[gusts_mps]);
+    digest
 }
 
 /// A search that panicked leaves whole entries behind.
@@ -77,6 +100,7 @@ fn flight(near: Option<&Comparison>, updraft_mps: f64) -> Flight {
 
 #[cfg(test)]
 mod tests {
+    use super::super::noise::Hyper;
     use super::super::trial;
     use super::*;
 
@@ -107,7 +131,7 @@ mod tests {
         let comparison = trial::comparison(&data);
         let flights = ModelFlights::default();
         let likely = |hyper: Hyper, gusts_mps: f64, nats: f64| {
-            flights.likely((&comparison, 0.0), (hyper, gusts_mps), || Some(nats))
+            flights.likely((&comparison, 0.0), (&hyper.into(), gusts_mps), || Some(nats))
         };
         let mut louder = Hyper::default();
         louder.0[0] += 1.0;

@@ -107,7 +107,7 @@ pub(super) fn settled(
     let mut last = start;
     for _ in 0..SETTLED {
         let patterns = shifted(&groups(&last.beta), problem, &last);
-        last = problem.among(&patterns).fit(last.hyper, Likelihood::Profile);
+        last = problem.among(&patterns).fit(&last, Likelihood::Profile);
         let more = last.log_posterior() - best.1.log_posterior();
         if more > 0.0 {
             best = (patterns, last.clone());

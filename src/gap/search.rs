@@ -8,7 +8,7 @@ use super::candidates::{Candidate, Variant};
 use super::decide::CLASS_NATS;
 use super::dependence::Dependence;
 use super::generic::Generic;
-use super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
 use super::noise::{GroupPattern, Hyper};
 use super::response::{Response, add_to, settled};
 use crate::base::rng::{Purpose, stream};
@@ -106,11 +106,21 @@ pub(super) struct Sought<'a> {
 /// drones flew; otherwise that is what the groups know of it.
 pub(super) fn round(
     problem: &Problem<'_>,
-    start: Hyper,
+    start: impl Into<Start>,
     sought: Sought<'_>,
     settles: bool,
 ) -> Round {
-    let mut found = round_from(problem, start, sought, settles);
+    round_on(problem, based(problem, start, settles), sought, settles)
+}
+
+/// Looks once, where the noise without what is sought is known.
+pub(super) fn round_on(
+    problem: &Problem<'_>,
+    first: Based,
+    sought: Sought<'_>,
+    settles: bool,
+) -> Round {
+    let mut found = round_from(problem, first, sought, settles);
     for _ in 0..BETTER_STARTS {
         // The noise has more than one likeliest place, and what a candidate leads to may be better for none, too.
         let by_effect = found.library.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
@@ -123,11 +133,11 @@ pub(super) fn round(
         }
         let groups = found.groups.clone();
         let there = problem.among(&groups);
-        let base = based(&there, hyper, settles).1;
-        if base.log_posterior() < found.base.log_posterior() + BETTER_NATS {
+        let again = based(&there, hyper, settles);
+        if again.1.log_posterior() < found.base.log_posterior() + BETTER_NATS {
             break;
         }
-        found = round_from(&there, hyper, sought, settles);
+        found = round_from(&there, again, sought, settles);
     }
     found
 }
@@ -137,8 +147,11 @@ const BETTER_STARTS: usize = 2;
 /// A place that is better by less is the same, nats. Numerical: far below a threshold.
 const BETTER_NATS: f64 = 0.2;
 
+/// A model with its noise and nothing of what is sought; the patterns have the air that all shared.
+pub(super) type Based = (Vec<GroupPattern>, Solution);
+
 /// The noise by a start, with nothing of what is sought.
-fn based(problem: &Problem<'_>, start: Hyper, settles: bool) -> (Vec<GroupPattern>, Solution) {
+pub(super) fn based(problem: &Problem<'_>, start: impl Into<Start>, settles: bool) -> Based {
     let first = problem.fit(start, Likelihood::Profile);
     if settles {
         settled(problem, first, |_| problem.groups.to_vec())
@@ -147,8 +160,12 @@ fn based(problem: &Problem<'_>, start: Hyper, settles: bool) -> (Vec<GroupPatter
     }
 }
 
-fn round_from(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>, settles: bool) -> Round {
-    let (groups, base) = based(problem, start, settles);
+fn round_from(
+    problem: &Problem<'_>,
+    (groups, base): Based,
+    sought: Sought<'_>,
+    settles: bool,
+) -> Round {
     let problem = &problem.among(&groups);
     let mut library = scan(&base, sought);
     let best = library.first().map_or(0.0, |best| best.gain);
@@ -233,7 +250,7 @@ fn refit(
     let candidate = &sought.library[ranked.candidate];
     let variant = &candidate.variants[ranked.variant];
     let problem = problem.with([&variant.column]);
-    let mut with = problem.fit(base.hyper, Likelihood::Profile);
+    let mut with = problem.fit(base, Likelihood::Profile);
     let before = before + variant.price_nats;
     let plain = ranked.plain.max(with.log_posterior() - before);
     // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
@@ -244,7 +261,7 @@ fn refit(
     if settles && candidate.size.is_some() {
         with = settled(&problem, with, feeling).1;
     } else if variant.felt.is_some() {
-        with = problem.among(&feeling(&with.beta)).fit(with.hyper, Likelihood::Profile);
+        with = problem.among(&feeling(&with.beta)).fit(&with, Likelihood::Profile);
     }
     let beta = with.beta.last().copied().unwrap_or(0.0);
     let gain = with.log_posterior() - before;
@@ -318,7 +335,7 @@ fn free_shapes(
             }
             let generic = &sought.generics[found.generic];
             let problem = problem.with(&generic.columns);
-            let mut with = problem.fit(base.hyper, Likelihood::Profile);
+            let mut with = problem.fit(base, Likelihood::Profile);
             let first = with.beta.len() - generic.columns.len();
             if settles {
                 with = settled(&problem, with, |_| problem.groups.to_vec()).1;
@@ -331,7 +348,7 @@ fn free_shapes(
                 with = if settles {
                     settled(&problem, with, feeling).1
                 } else {
-                    problem.among(&feeling(&with.beta)).fit(with.hyper, Likelihood::Profile)
+                    problem.among(&feeling(&with.beta)).fit(&with, Likelihood::Profile)
                 };
                 // What it does to the scatter is known by its size, which means alone may hardly tell.
                 if numb.log_posterior() > with.log_posterior() {
@@ -446,7 +463,7 @@ pub(super) fn thresholds(
                 pulses: &split,
                 columns: problem.columns.clone(),
             };
-            let round = round(&null, base.hyper, sought, false);
+            let round = round(&null, base, sought, false);
             (round.best(), round.best_generic())
         })
         .collect();

@@ -20,25 +20,44 @@ pub(crate) fn minimise<const N: usize>(
         let value = function(at);
         (value, value)
     };
-    let (at, value, _) = minimise_known(start, function, |at, value| gradient_at(at, *value));
+    let slopes = |at: &[f64; N], value: &f64| gradient_at(at, *value);
+    let Least { at, value, .. } = minimise_known(start, None, function, slopes);
     (at, value)
 }
 
-/// As [`minimise`], of a function that tells with its value what its gradient is made from. With that at the end.
+/// The inverse of a function's second derivatives.
+pub(crate) type Inverse<const N: usize> = [[f64; N]; N];
+
+/// Where a function is least.
+pub(crate) struct Least<const N: usize, T> {
+    /// The place.
+    pub at: [f64; N],
+    /// The value there.
+    pub value: f64,
+    /// What the function told with it.
+    pub known: T,
+    /// The inverse of the second derivatives, as the steps there tell them.
+    pub inverse: Inverse<N>,
+}
+
+/// As [`minimise`], of a function that tells with its value what its gradient is made from. The inverse of the second
+/// derivatives of a function that is much like it, if there is one, saves steps.
 pub(crate) fn minimise_known<const N: usize, T>(
     start: [f64; N],
+    alike: Option<&Inverse<N>>,
     function: impl Fn(&[f64; N]) -> (f64, T),
     gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
-) -> ([f64; N], f64, T) {
+) -> Least<N, T> {
     let value_at = |at: &[f64; N]| {
         let (value, known) = function(at);
         (if value.is_finite() { value } else { f64::INFINITY }, known)
     };
+    let first = || alike.copied().unwrap_or_else(identity);
     let mut at = start;
     let (mut value, mut known) = value_at(&at);
     let mut gradient = gradient_at(&at, &known);
-    let mut inverse = identity::<N>();
-    let (mut small, mut is_again) = (0, false);
+    let mut inverse = first();
+    let (mut small, mut learned) = (0, None);
     for _ in 0..MOST_STEPS {
         let mut direction = [0.0; N];
         for (row, part) in direction.iter_mut().enumerate() {
@@ -73,15 +92,16 @@ pub(crate) fn minimise_known<const N: usize, T>(
         update(&mut inverse, &difference(&next, &at), &difference(&next_gradient, &gradient));
         (at, value, gradient, known) = (next, next_value, next_gradient, next_known);
         small = if gained < ENOUGH { small + 1 } else { 0 };
-        if small == 2 && is_again {
+        if small == 2 && learned.is_some() {
             break;
         }
         if small == 2 {
             // What was learned of the curvature on the way may be wrong here.
-            (inverse, is_again, small) = (identity(), true, 0);
+            learned = Some(std::mem::replace(&mut inverse, first()));
+            small = 0;
         }
     }
-    (at, value, known)
+    Least { at, value, known, inverse: learned.unwrap_or(inverse) }
 }
 
 /// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.

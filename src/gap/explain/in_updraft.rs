@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::super::error::GapError;
-use super::super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
 use super::super::noise::{GroupPattern, Hyper};
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
@@ -29,7 +29,7 @@ impl Search<'_> {
                 Ok(there) if there.data.bins_of_groups() == bins => self.comparison = there,
                 _ => continue,
             }
-            let look = self.look(In::Present(None))?;
+            let look = self.look_at_beginning()?;
             let share = updraft_mps / UPDRAFT_DOUBT_MPS;
             let explained = look.explained();
             let by = (explained.lacks_effect, explained.nats - 0.5 * share * share);
@@ -60,7 +60,7 @@ impl Search<'_> {
         self.found.updraft_mps = 0.0;
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
-        let still = self.look(In::Present(Some(&look.patterns)))?;
+        let still = self.look(In::Present(Some(&look.seen.patterns)))?;
         let (with, without) = (look.explained(), still.explained());
         // Where the updraft leaves nothing to be found, an effect instead of it must explain clearly more.
         let is_instead = without.lacks_effect && !with.lacks_effect;
@@ -121,7 +121,8 @@ impl Search<'_> {
         }
         let starts = [&[0.0], &UPDRAFTS_MPS[..]].concat();
         let nearest = self.nearest_flight_mps(&starts);
-        let of = |starts: &[f64], steps: &[f64]| self.likeliest_flight(look.hyper, starts, steps);
+        let of =
+            |starts: &[f64], steps: &[f64]| self.likeliest_flight(&look.seen.start, starts, steps);
         // In calm air few hundredths of a metre per second are the likeliest, and steps from afar miss them.
         let beside = nearest.and_then(|mps| of(&[mps], &FLIGHT_STEPS_MPS[3..]));
         let likeliest = of(&starts, &FLIGHT_STEPS_MPS).into_iter().chain(beside);
@@ -158,7 +159,7 @@ impl Search<'_> {
         }
         let hyper = if went { self.found.hyper } else { hyper };
         let start = [self.found.updraft_mps];
-        let likeliest = self.likeliest_flight(hyper, &start, &FLIGHT_STEPS_MPS[..3]);
+        let likeliest = self.likeliest_flight(&Start::from(hyper), &start, &FLIGHT_STEPS_MPS[..3]);
         let elsewhere = likeliest.filter(|(_, mps)| *mps != self.found.updraft_mps);
         if let Some((_, updraft_mps)) = elsewhere
             && let Some(nats) = self.goes_to(updraft_mps, nats)?
@@ -179,7 +180,7 @@ impl Search<'_> {
             free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
             let at_mps = found.updraft_mps;
             let Some(here) =
-                InUpdraft::fitted(comparison, &patterns, found, &free, found.hyper, at_mps)
+                InUpdraft::fitted(comparison, &patterns, found, &free, &found.hyper.into(), at_mps)
             else {
                 break;
             };
@@ -218,11 +219,11 @@ impl Search<'_> {
     /// from the best of some starts by steps to either side; `None`: it can fly in none.
     fn likeliest_flight(
         &self,
-        hyper: Hyper,
+        noise: &Start,
         starts_mps: &[f64],
         steps_mps: &[f64],
     ) -> Option<(f64, f64)> {
-        most_beside(|updraft_mps| self.likely_in(updraft_mps, hyper), starts_mps, steps_mps)
+        most_beside(|updraft_mps| self.likely_in(updraft_mps, noise), starts_mps, steps_mps)
     }
 
     /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
@@ -237,15 +238,15 @@ impl Search<'_> {
     }
 
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
-    fn likely_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
-        let fit = || self.fitted_in(updraft_mps, hyper);
+    fn likely_in(&self, updraft_mps: f64, noise: &Start) -> Option<f64> {
+        let fit = || self.fitted_in(updraft_mps, noise.clone());
         if !self.has_model() {
             return fit();
         }
-        self.flights.likely((&self.comparison, updraft_mps), (hyper, self.found.gusts_mps), fit)
+        self.flights.likely((&self.comparison, updraft_mps), (noise, self.found.gusts_mps), fit)
     }
 
-    fn fitted_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
+    fn fitted_in(&self, updraft_mps: f64, noise: Start) -> Option<f64> {
         let Found { vehicle, parameters, .. } = &self.found;
         let there = self.flown_in(updraft_mps).ok()?;
         if there.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
@@ -253,16 +254,16 @@ impl Search<'_> {
         }
         let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
         let known = doubts.get(1..).unwrap_or_default();
-        let (mut likely, mut hyper, mut gusts) = (None, hyper, self.found.gusts_mps);
+        let (mut likely, mut noise, mut gusts) = (None, noise, self.found.gusts_mps);
         for _ in 0..2 {
             let patterns = there.patterns(vehicle, gusts).ok()?;
             let residual = Split::of(&there.residual(vehicle, gusts).ok()?);
             let problem = Problem::new(&patterns, &residual).doubting(known);
-            let fit = problem.fit(hyper, Likelihood::Profile);
+            let fit = problem.fit(noise, Likelihood::Profile);
             let fit = settled(&problem, fit, |_| patterns.clone()).1;
             likely = Some(fit.log_posterior());
-            hyper = fit.hyper;
-            gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
+            noise = Start::from(&fit);
+            gusts = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
         }
         let share = updraft_mps / UPDRAFT_DOUBT_MPS;
         let leans_nats = there.lean_misfit_nats();
@@ -292,12 +293,13 @@ impl Search<'_> {
             let Self { comparison, found, .. } = self;
             // How drones answer gusts stays as it is meanwhile: their scatter must not choose an updraft.
             let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-            let fit = |hyper: Hyper, updraft_mps: f64| {
-                InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
+            let fit = |noise: &Start, updraft_mps: f64| {
+                InUpdraft::fitted(comparison, &patterns, found, free, noise, updraft_mps)
             };
-            let Some(here) = fit(solution.hyper, found.updraft_mps) else { break };
+            let noise = Start::from(&solution);
+            let Some(here) = fit(&noise, found.updraft_mps) else { break };
             let here_nats = here.likely;
-            let modes = likeliest(fit, &starts, solution.hyper);
+            let modes = likeliest(fit, &starts, &noise);
             let Some(best) = self.likelier(modes, here)? else { break };
             let found = &mut self.found;
             let before_mps = std::mem::replace(&mut found.updraft_mps, best.updraft_mps);
@@ -324,8 +326,9 @@ impl Search<'_> {
                     (self.comparison.clone().in_updraft(best.updraft_mps), patterns)
                 };
             // What its steady states seemed to explain the model must explain when it is flown.
-            let (hyper, updraft_mps) = (best.solution.hyper, best.updraft_mps);
-            let again = InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps);
+            let (noise, updraft_mps) = (Start::from(&best.solution), best.updraft_mps);
+            let again =
+                InUpdraft::fitted(&there, &patterns, &self.found, free, &noise, updraft_mps);
             if again.is_none_or(|again| again.likely < here_nats - SAME_NATS) {
                 self.found.updraft_mps = before_mps;
                 break;
@@ -358,8 +361,8 @@ impl Search<'_> {
             };
             let found = &self.found;
             let patterns = there.patterns(&found.vehicle, found.gusts_mps)?;
-            let (hyper, at_mps) = (mode.solution.hyper, mode.updraft_mps);
-            let again = InUpdraft::fitted(&there, &patterns, found, &[], hyper, at_mps);
+            let (noise, at_mps) = (Start::from(&mode.solution), mode.updraft_mps);
+            let again = InUpdraft::fitted(&there, &patterns, found, &[], &noise, at_mps);
             if let Some(again) = again.filter(|again| again.likely > most) {
                 (best, most) = (Some(mode), again.likely);
             }
@@ -390,12 +393,12 @@ fn most_beside(
 /// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the
 /// others to either side; none: the vehicle can fly in none of them.
 fn likeliest(
-    fit: impl Fn(Hyper, f64) -> Option<InUpdraft> + Sync,
+    fit: impl Fn(&Start, f64) -> Option<InUpdraft> + Sync,
     starts_mps: &[f64],
-    hyper: Hyper,
+    noise: &Start,
 ) -> Vec<InUpdraft> {
     let there: Vec<Option<InUpdraft>> =
-        starts_mps.par_iter().map(|start_mps| fit(hyper, *start_mps)).collect();
+        starts_mps.par_iter().map(|start_mps| fit(noise, *start_mps)).collect();
     // The present one, and the best to either side of it.
     let mut there = there.into_iter();
     let present = there.next().flatten();
@@ -414,16 +417,17 @@ fn likeliest(
 }
 
 /// The updraft that explains most, from one that explains less.
-fn climbed(fit: &impl Fn(Hyper, f64) -> Option<InUpdraft>, start: InUpdraft) -> InUpdraft {
+fn climbed(fit: &impl Fn(&Start, f64) -> Option<InUpdraft>, start: InUpdraft) -> InUpdraft {
     let mut best = start;
     for _ in 0..UPDRAFT_ROUNDS {
-        let (at_mps, hyper, likely) = (best.updraft_mps, best.solution.hyper, best.likely);
+        let (at_mps, likely) = (best.updraft_mps, best.likely);
+        let noise = Start::from(&best.solution);
         let step_mps = (best.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
         if step_mps.abs() < UPDRAFT_SETTLED_MPS {
             break;
         }
         for share in [1.0, 0.5] {
-            if let Some(there) = fit(hyper, at_mps + share * step_mps) {
+            if let Some(there) = fit(&noise, at_mps + share * step_mps) {
                 best = better(best, there);
             }
             if best.likely > likely {
@@ -453,7 +457,7 @@ impl InUpdraft {
         patterns: &[GroupPattern],
         found: &Found,
         free: &[Column],
-        hyper: Hyper,
+        noise: &Start,
         updraft_mps: f64,
     ) -> Option<Self> {
         let comparison = comparison.clone().in_updraft(updraft_mps);
@@ -473,7 +477,7 @@ impl InUpdraft {
         }
         let split = Split::of(&from_still);
         let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
-        let solution = problem.fit(hyper, Likelihood::Profile);
+        let solution = problem.fit(noise, Likelihood::Profile);
         // How likely this updraft is, not the one that the doubt's line would lead to.
         let known = doubts.get(1..).unwrap_or_default();
         let fixed = Problem::new(patterns, &here).doubting(known).with(free).at(&solution.hyper);

@@ -76,7 +76,12 @@ pub fn in_climb(share: f64, induced: f64, axial: f64) -> Working {
     for _ in 0..CLIMB_STEPS {
         let off = thrust - 1.0 - beta + beta * flow(thrust);
         let of_root = (1.0 - induced) / thrust.sqrt() + induced / (half * half + thrust).sqrt();
-        thrust = (thrust - off / (1.0 + 0.5 * beta * of_root)).max(LEAST_THRUST);
+        let next = (thrust - off / (1.0 + 0.5 * beta * of_root)).max(LEAST_THRUST);
+        // Every further step would find the same.
+        if next == thrust {
+            break;
+        }
+        thrust = next;
     }
     Working { thrust, flow: flow(thrust) }
 }

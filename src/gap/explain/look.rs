@@ -1,0 +1,185 @@
+//! One look at a flight: what the model with the present findings leaves, in its air and noise, and what may explain it.
+
+use std::sync::{Arc, OnceLock};
+
+use super::super::candidates::{
+    Candidate, Updraft, axial_drag, library, of_the_air, one, read_otherwise,
+};
+use super::super::error::GapError;
+use super::super::generic::{Generic, all};
+use super::super::gls::{Column, Likelihood, Problem, Split, Start};
+use super::super::noise::GroupPattern;
+use super::super::refine::{self, slopes};
+use super::super::response::gusts_mps;
+use super::super::search::{Based, FLOOR_NATS, FREE_FLOOR_NATS, Round, Sought, based, round_on};
+use super::{MOST_GUSTS_MPS, Search};
+use crate::effects::Role;
+
+/// The updraft in which is looked.
+#[derive(Clone, Copy)]
+pub(super) enum In<'a> {
+    /// The one that explains most.
+    Settled,
+    /// The present one; in noise of these patterns, if there are any.
+    Present(Option<&'a [GroupPattern]>),
+}
+
+/// A flight as it is seen before anything is sought in it.
+#[derive(Clone, Debug)]
+pub(in crate::gap) struct Seen {
+    pub(super) patterns: Vec<GroupPattern>,
+    residual: Split,
+    /// Regressors that are not judged: what was found before, whose size may change with what comes after.
+    free: Vec<Column>,
+    doubts: Vec<Column>,
+    /// Noise and air.
+    pub(super) start: Start,
+    /// Gusts of that noise, with which the model's curve was bent, m/s.
+    gusts_mps: f64,
+    /// How unlikely the leans are, nats.
+    lean_misfit_nats: f64,
+    /// The model with its noise, if that was fitted already.
+    based: Option<Based>,
+}
+
+impl Seen {
+    fn problem(&self) -> Problem<'_> {
+        Problem::new(&self.patterns, &self.residual).doubting(&self.doubts).with(&self.free)
+    }
+}
+
+/// What is looked at in one round, and for what.
+#[derive(Clone)]
+pub(super) struct Look {
+    pub seen: Arc<Seen>,
+    pub candidates: Vec<Candidate>,
+    pub generics: Vec<Generic>,
+    drones: Vec<usize>,
+    /// What explains how much, once it is computed.
+    round: OnceLock<Round>,
+}
+
+/// How well a look's air and noise explain the flight, with the best effect.
+pub(super) struct Explained {
+    /// Log-posterior, that of the leans as well, and what the best effect gains above its threshold, nats.
+    pub nats: f64,
+    /// Whether an effect gains more than its threshold.
+    pub lacks_effect: bool,
+    /// Whether a free shape does.
+    pub lacks_shape: bool,
+}
+
+impl Look {
+    pub(super) fn explained(&self) -> Explained {
+        let round = self.round();
+        let by_effect = (round.best() - FLOOR_NATS).max(0.0);
+        Explained {
+            nats: round.base.log_posterior() - self.seen.lean_misfit_nats + by_effect,
+            lacks_effect: by_effect > 0.0,
+            lacks_shape: round.best_generic() > FREE_FLOOR_NATS,
+        }
+    }
+
+    pub(super) fn round(&self) -> &Round {
+        self.round.get_or_init(|| {
+            let (problem, seen) = (self.problem(), &self.seen);
+            let first = seen.based.clone().unwrap_or_else(|| based(&problem, &seen.start, true));
+            round_on(&problem, first, self.sought(), true)
+        })
+    }
+
+    pub(super) fn problem(&self) -> Problem<'_> {
+        self.seen.problem()
+    }
+
+    pub(super) fn sought(&self) -> Sought<'_> {
+        let Self { candidates, generics, drones, .. } = self;
+        Sought { library: candidates, generics, drones }
+    }
+}
+
+impl Search<'_> {
+    /// What is left, and everything that may explain it.
+    pub(super) fn look(&mut self, updraft: In<'_>) -> Result<Look, GapError> {
+        let seen = self.seen(updraft)?;
+        self.look_at(Arc::new(seen))
+    }
+
+    /// What is left in the present updraft, before anything was found: to each effect that alone is searched for it looks the
+    /// same.
+    pub(super) fn look_at_beginning(&mut self) -> Result<Look, GapError> {
+        let of = (&self.comparison.clone(), self.found.updraft_mps);
+        let (flights, start) = (self.flights, Start::from(self.found.hyper));
+        let seen = flights.seen(of, (&start, self.found.gusts_mps), || {
+            let mut seen = self.seen(In::Present(None))?;
+            seen.based = Some(based(&seen.problem(), &seen.start, true));
+            Ok(seen)
+        })?;
+        self.found.gusts_mps = seen.gusts_mps;
+        self.look_at(seen)
+    }
+
+    fn seen(&mut self, updraft: In<'_>) -> Result<Seen, GapError> {
+        let Self { comparison, found, .. } = self;
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+        let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+        // Gusts that the residual shows bend the model's curve: known physics first.
+        let mut free = found.extras.clone();
+        free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
+        let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
+        let mut quick = Problem::new(&patterns, &residual)
+            .doubting(&doubts)
+            .with(&free)
+            .fit(found.hyper, Likelihood::Profile);
+        if matches!(updraft, In::Settled) && self.may_differ_in_updraft() {
+            quick = self.settle_updraft(&free, quick)?;
+        }
+        let Self { comparison, found, .. } = self;
+        let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
+        found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
+        let patterns = match updraft {
+            In::Present(Some(patterns)) => patterns.to_vec(),
+            _ => comparison.patterns(&found.vehicle, found.gusts_mps)?,
+        };
+        let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+        Ok(Seen {
+            patterns,
+            residual,
+            free,
+            doubts,
+            start: Start::from(&quick),
+            gusts_mps: found.gusts_mps,
+            lean_misfit_nats: comparison.lean_misfit_nats(),
+            based: None,
+        })
+    }
+
+    fn look_at(&self, seen: Arc<Seen>) -> Result<Look, GapError> {
+        let Self { comparison, found, refused, lacked_drag, .. } = self;
+        let updraft = if self.may_differ_in_updraft() { Updraft::MayDiffer } else { Updraft::Same };
+        let only = self.options.only.filter(|_| found.steps.is_empty());
+        let is_wanted = |name: &str| only.is_none_or(|only| only.effect == name);
+        let mut candidates = match only {
+            Some(only) => {
+                one(&found.vehicle, comparison, updraft, only.effect)?.into_iter().collect()
+            }
+            None => library(&found.vehicle, comparison, updraft)?,
+        };
+        let is_asked = only.is_some_and(|only| Role::MomentumDrag.is_of(only.effect));
+        if only.is_none() || is_asked {
+            candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag, is_asked)?);
+        }
+        let reads_otherwise = Role::RotorDrag.place().is_some_and(|place| is_wanted(place.name()));
+        if reads_otherwise && !comparison.is_in_other_wind() {
+            candidates.extend(read_otherwise(comparison, &found.vehicle, updraft)?);
+        }
+        candidates.retain(|candidate| !refused.contains(&candidate.name));
+        let mut generics = Vec::new();
+        if only.is_none() {
+            candidates.extend(of_the_air(&comparison.scene, &seen.patterns, &seen.start.hyper));
+            generics = all(&comparison.scene, &comparison.headings());
+        }
+        let drones = comparison.data.counts();
+        Ok(Look { seen, candidates, generics, drones, round: OnceLock::new() })
+    }
+}
