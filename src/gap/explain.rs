@@ -64,6 +64,13 @@ pub struct Only {
     pub beaten_nats: f64,
 }
 
+impl Only {
+    /// Whether an effect that explains so much in the best of some updrafts, nats, need not be flown in its own.
+    fn is_out_of_reach(self, nats: f64) -> bool {
+        nats < self.beaten_nats - HOPELESS_NATS
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self {
@@ -170,7 +177,7 @@ impl Found {
     }
 }
 
-/// What is searched in: the drones that are to be fitted, with what their flight is held against.
+/// The drones that are to be fitted, with all that their flight is held against.
 #[derive(Clone, Copy)]
 pub(super) struct Setting<'a> {
     /// Drones to be fitted.
@@ -189,9 +196,9 @@ pub(super) struct Setting<'a> {
 
 /// A search that ended.
 pub(super) struct Searched {
-    /// What was found.
+    /// Findings as they are told, with the model that they make.
     pub found: Found,
-    /// What was left to be looked for, if that was not asked for.
+    /// The end of the search, if nobody asked for what is left there.
     pub left: Option<Left>,
 }
 
@@ -324,9 +331,7 @@ impl Search<'_> {
             Some(only) => self.look_where_it_explains_most(only)?,
             None => self.look_in_likelier_updraft()?,
         };
-        if let Some(only) = asked
-            && look.explained().nats < only.beaten_nats - HOPELESS_NATS
-        {
+        if asked.is_some_and(|only| only.is_out_of_reach(look.explained().nats)) {
             return Ok(Taken::No(None));
         }
         let look = if asked.is_some() || !self.may_differ_in_updraft() {
@@ -656,19 +661,44 @@ mod tests {
         (simulated, options, flights): (&'a Simulated<'a>, &'a Options, &'a ModelFlights),
         comparison: Comparison,
     ) -> Search<'a> {
-        Search {
-            data,
-            vehicle,
-            lacked_drag: false,
-            simulated,
+        let setting = Setting { data, original: vehicle, vehicle, simulated, plan: None, flights };
+        setting.begun(options, comparison)
+    }
+
+    #[test]
+    fn an_effect_that_explains_far_less_is_not_flown() {
+        let only = Only { effect: "battery", updraft_mps: 0.0, beaten_nats: -1000.0 };
+        assert!(only.is_out_of_reach(-1301.0) && !only.is_out_of_reach(-1300.0));
+    }
+
+    #[test]
+    fn what_is_left_is_the_same_whenever_it_is_looked_for() {
+        // A curve of the climb, and a drift that leaves it with something.
+        let data = trial::data(3, |drone, bin| {
+            let ripple_us = 0.3 * f64::from((5 * bin.segment as i32 + drone as i32) % 3 - 1);
+            6.0 * bin.climb_mps().abs() + 0.05 * bin.middle_s() + ripple_us
+        });
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let flights = ModelFlights::default();
+        let setting = Setting {
+            data: &data,
+            original: &vehicle,
+            vehicle: &vehicle,
+            simulated: &simulated,
             plan: None,
-            options,
-            flights,
-            found: Found::nothing(comparison.clone()),
-            comparison,
-            refused: Vec::new(),
-            last: None,
-        }
+            flights: &flights,
+        };
+        let at_once = Options { most_steps: 1, replicates: 0, ..Options::default() };
+        let later = Options { rest: false, ..at_once };
+        let Searched { found, left } = setting.search(&at_once).unwrap();
+        assert!(left.is_none(), "it was looked for");
+        assert_eq!(found.steps.len(), 1, "{:?}", found.steps);
+        let Searched { found: before, left } = setting.search(&later).unwrap();
+        assert_ne!(before.rest, found.rest, "only that of the step before");
+        let after = setting.look_for_rest(&at_once, left.unwrap()).unwrap();
+        assert_eq!(after.rest, found.rest);
+        let told = |found: &Found| format!("{:?}", found.steps);
+        assert_eq!(told(&after), told(&found));
     }
 
     #[test]

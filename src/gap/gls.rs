@@ -211,7 +211,7 @@ impl White {
 /// Noise that was fitted: of several flights' searches.
 static FITTED: Memory<Start> = Memory::of(20_000);
 
-/// Where a fit of the noise begins.
+/// The place at which a fit of the noise begins.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Start {
     /// Parameters of the noise.

@@ -28,13 +28,13 @@ pub(crate) fn minimise<const N: usize>(
 /// The inverse of a function's second derivatives.
 pub(crate) type Inverse<const N: usize> = [[f64; N]; N];
 
-/// Where a function is least.
+/// The least value of a function.
 pub(crate) struct Least<const N: usize, T> {
-    /// The place.
+    /// Variables at which the function is least.
     pub at: [f64; N],
-    /// The value there.
+    /// Value of the function at them.
     pub value: f64,
-    /// What the function told with it.
+    /// Everything that the function told with it.
     pub known: T,
     /// The inverse of the second derivatives, as the steps there tell them.
     pub inverse: Inverse<N>,
@@ -159,6 +159,34 @@ fn update<const N: usize>(inverse: &mut [[f64; N]; N], step: &[f64; N], change: 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_bends_of_a_like_function_save_steps() {
+        use std::cell::Cell;
+
+        // Variables of scales that differ, and that go together.
+        let bowl = |at: &[f64; 4]| {
+            let sum: f64 = at.iter().sum();
+            let own = at.iter().zip([1.0, 20.0, 300.0, 0.05]).map(|(x, bend)| bend * x * x);
+            5.0 * sum * sum + own.sum::<f64>()
+        };
+        let search = |start: [f64; 4], alike: Option<&Inverse<4>>| {
+            let asked = Cell::new(0);
+            let function = |at: &[f64; 4]| {
+                asked.set(asked.get() + 1);
+                (bowl(at), bowl(at))
+            };
+            let slopes = |at: &[f64; 4], value: &f64| differences(bowl, at, *value);
+            let least = minimise_known(start, alike, function, slopes);
+            assert!(least.value < 1e-2, "{}", least.value);
+            (asked.get(), least.inverse)
+        };
+        let (first, inverse) = search([2.0, -1.0, 0.5, 3.0], None);
+        let elsewhere = [-1.0, 0.6, 0.3, -2.0];
+        let ((with, _), (without, _)) =
+            (search(elsewhere, Some(&inverse)), search(elsewhere, None));
+        assert!(2 * with < without && with < first, "{first} {with} {without}");
+    }
 
     #[test]
     fn a_bent_valley_is_followed() {

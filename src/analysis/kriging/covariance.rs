@@ -36,12 +36,13 @@ pub(in super::super) enum Form {
 impl Form {
     pub(super) const ALL: [Self; 3] = [Self::Turbulent, Self::Exponential, Self::Gaussian];
 
-    /// Correlation at a distance and a time in units of their scales.
-    fn correlation(self, r: f64, t: f64) -> f64 {
+    /// Minus the logarithm of the correlation by a distance or a time, by the square of that in units of its scale.
+    fn fall(self, square: f64) -> f64 {
         match self {
-            Self::Turbulent => (-(r * r).cbrt() - (t * t).cbrt()).exp(),
-            Self::Exponential => (-r - t).exp(),
-            Self::Gaussian => (-r * r - t * t).exp(),
+            // Faster than the root that rounds correctly.
+            Self::Turbulent => (square.ln() / 3.0).exp(),
+            Self::Exponential => square.sqrt(),
+            Self::Gaussian => square,
         }
     }
 
@@ -193,20 +194,29 @@ impl Covariance {
 
     /// Covariance of the field alone, (m/s)².
     pub(super) fn field(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
-        let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
-        let still = u == 0.0 && v == 0.0;
-        let variance = sd_mps * sd_mps;
-        let slow = self.slow(apart_m, apart_s);
-        if still && form == Form::Exponential {
-            return variance * (-self.distance(apart_m)).exp() * mean_exponential(apart_s, time_s)
-                + slow;
-        }
-        let at = |(node, weight): &(f64, f64)| {
+        self.apart(apart_s).field(apart_m)
+    }
+
+    /// The field so many seconds apart.
+    pub(super) fn apart(&self, apart_s: f64) -> Apart<'_> {
+        let Air { form, time_s, drift_mps: [u, v], .. } = self.air;
+        let nodes = DIFFERENCES.map(|(node, share)| {
             let dt = apart_s + node * RUNNING_S;
-            let moved = [apart_m[0] - u * dt, apart_m[1] - v * dt, apart_m[2]];
-            weight * form.correlation(self.distance(moved), dt.abs() / time_s)
-        };
-        variance * DIFFERENCES.iter().map(at).sum::<f64>() + slow
+            Node { drifted_m: [u * dt, v * dt], share, fall: form.fall((dt / time_s).powi(2)) }
+        });
+        let still = self.is_reversible().then(|| match form {
+            Form::Exponential => mean_exponential(apart_s, time_s),
+            Form::Turbulent | Form::Gaussian => {
+                nodes.iter().map(|node| node.share * (-node.fall).exp()).sum()
+            }
+        });
+        Apart { of: self, seconds: apart_s, nodes, still }
+    }
+
+    /// Correlation of the field by the way, (m/s)², and of its slow part, where nothing drifts.
+    pub(super) fn by_way(&self, way_m: [f64; 3]) -> [f64; 2] {
+        let Air { form, sd_mps, .. } = self.air;
+        [sd_mps * sd_mps * (-form.fall(self.square(way_m))).exp(), self.slow(way_m, 0.0)]
     }
 
     /// Covariance of the slow part, which means over 10 s do not change, (m/s)².
@@ -230,9 +240,9 @@ impl Covariance {
     pub(super) fn instant_field(&self, apart_m: [f64; 3], apart_s: f64) -> f64 {
         let [x, y, z] = apart_m;
         let Air { form, sd_mps, time_s, drift_mps: [u, v], .. } = self.air;
-        let r = self.distance([x - u * apart_s, y - v * apart_s, z]);
-        let t = apart_s.abs() / time_s;
-        sd_mps * sd_mps * form.correlation(r, t)
+        let square = self.square([x - u * apart_s, y - v * apart_s, z]);
+        let fall = form.fall(square) + form.fall((apart_s / time_s).powi(2));
+        sd_mps * sd_mps * (-fall).exp()
     }
 
     /// Covariance of a drone's own gusts, (m/s)².
@@ -240,12 +250,57 @@ impl Covariance {
         self.air.gust_mps.powi(2) * mean_exponential(apart_s, self.air.gust_s)
     }
 
-    /// Distance in units of the length.
-    fn distance(&self, [x, y, z]: [f64; 3]) -> f64 {
+    /// Square of the distance in units of the length.
+    fn square(&self, [x, y, z]: [f64; 3]) -> f64 {
         let [[a, b], [c, d]] = self.inverse;
         let (along, across) = (a * x + b * y, c * x + d * y);
         let up = z / self.air.length_m;
-        (along * along + across * across + up * up).sqrt()
+        along * along + across * across + up * up
+    }
+}
+
+/// One difference of two windows.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// How far the field drifts meanwhile, m.
+    drifted_m: [f64; 2],
+    /// Share of the pairs that have it.
+    share: f64,
+    /// Minus the logarithm of the correlation by the time.
+    fall: f64,
+}
+
+/// A field at times so far apart, with what does not depend on the places computed once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Apart<'a> {
+    of: &'a Covariance,
+    seconds: f64,
+    nodes: [Node; DIFFERENCES.len()],
+    /// Where nothing drifts: the correlation by the time.
+    still: Option<f64>,
+}
+
+impl Apart<'_> {
+    /// Covariance of the field over a way, (m/s)².
+    pub(super) fn field(&self, way_m: [f64; 3]) -> f64 {
+        if self.still.is_some() {
+            return self.field_by(way_m, self.of.by_way(way_m));
+        }
+        let Air { form, sd_mps, .. } = self.of.air;
+        let [x, y, z] = way_m;
+        let at = |node: &Node| {
+            let [u, v] = node.drifted_m;
+            node.share * (-form.fall(self.of.square([x - u, y - v, z])) - node.fall).exp()
+        };
+        sd_mps * sd_mps * self.nodes.iter().map(at).sum::<f64>() + self.of.slow(way_m, self.seconds)
+    }
+
+    /// The same where the correlations by the way are known, which count if nothing drifts.
+    pub(super) fn field_by(&self, way_m: [f64; 3], [field, slow]: [f64; 2]) -> f64 {
+        match self.still {
+            Some(by_time) => field * by_time + slow * (-self.seconds.abs() / SLOW_S).exp(),
+            None => self.field(way_m),
+        }
     }
 }
 
@@ -317,6 +372,40 @@ mod tests {
     }
 
     #[test]
+    fn what_is_computed_once_changes_nothing() {
+        for (form, by) in
+            [(Form::Turbulent, 2.0 / 3.0), (Form::Exponential, 1.0), (Form::Gaussian, 2.0)]
+        {
+            for drift_mps in [[0.0; 2], [2.0, -0.5]] {
+                let covariance = Covariance::new(Air { drift_mps, slow_mps: 0.1, ..air(form) });
+                let [u, v] = drift_mps;
+                for (way_m, apart_s) in
+                    [([0.0; 3], 0.0), ([30.0, -10.0, 5.0], 20.0), ([0.0, 7.0, 0.0], -4.0)]
+                {
+                    let [x, y, z] = way_m;
+                    let fall = |dt: f64| {
+                        let r = ((x - u * dt).powi(2) + (y - v * dt).powi(2) + z * z).sqrt() / 80.0;
+                        r.powf(by) + (dt.abs() / 60.0).powf(by)
+                    };
+                    let nodes = DIFFERENCES
+                        .map(|(node, share)| share * (-fall(apart_s + node * RUNNING_S)).exp());
+                    let of_field = if form == Form::Exponential && covariance.is_reversible() {
+                        (-fall(0.0)).exp() * mean_exponential(apart_s, 60.0)
+                    } else {
+                        nodes.iter().sum()
+                    };
+                    let expected = 0.25 * of_field + covariance.slow(way_m, apart_s);
+                    let apart = covariance.apart(apart_s);
+                    let by_way = apart.field_by(way_m, covariance.by_way(way_m));
+                    for found in [apart.field(way_m), by_way, covariance.field(way_m, apart_s)] {
+                        assert!((found - expected).abs() < 1e-12, "{form:?} {found} {expected}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn covariances_are_positive_definite_whatever_drifts() {
         let spots: Vec<Spot> = (0..96)
             .map(|index| {
@@ -352,11 +441,12 @@ mod tests {
         let (along, across) =
             (stretched.field([40.0, 0.0, 0.0], 0.0), stretched.field([0.0, 40.0, 0.0], 0.0));
         assert!(along > covariance.field([40.0, 0.0, 0.0], 0.0) && along > across);
-        let ratio = stretched.distance([1.0, 0.0, 0.0]) / stretched.distance([0.0, 1.0, 0.0]);
+        let ratio =
+            stretched.square([1.0, 0.0, 0.0]).sqrt() / stretched.square([0.0, 1.0, 0.0]).sqrt();
         assert!((ratio - (-1.0_f64).exp()).abs() < 1e-9, "{ratio}");
         let diagonal = Covariance::new(Air { stretch: [0.0, 0.5], ..air(Form::Exponential) });
         let (with, against) =
-            (diagonal.distance([1.0, 1.0, 0.0]), diagonal.distance([1.0, -1.0, 0.0]));
+            (diagonal.square([1.0, 1.0, 0.0]).sqrt(), diagonal.square([1.0, -1.0, 0.0]).sqrt());
         assert!((with / against - (-1.0_f64).exp()).abs() < 1e-9);
     }
 

@@ -106,16 +106,24 @@ impl Blocks {
     fn lagged(&self, covariance: &Covariance, order: usize) -> DMatrix<f64> {
         let n = self.drones.len();
         let mut stacked = DMatrix::zeros((order + 1) * n, n);
+        let by_way: Vec<[f64; 2]> =
+            self.ways_m.iter().map(|way_m| covariance.by_way(*way_m)).collect();
         let mut fields = vec![0.0; self.ways_m.len()];
         for lag in 0..=order {
             let apart_s = lag as f64 * self.step_s;
             let besides = covariance.besides(apart_s);
-            for (field, way_m) in fields.iter_mut().zip(&self.ways_m) {
-                *field = covariance.field(*way_m, apart_s);
+            let apart = covariance.apart(apart_s);
+            for (field, (way_m, by_way)) in fields.iter_mut().zip(self.ways_m.iter().zip(&by_way)) {
+                *field = apart.field_by(*way_m, *by_way);
             }
             let mut block = stacked.rows_mut((order - lag) * n, n);
-            for (value, (place, way)) in block.iter_mut().zip(self.way.iter().enumerate()) {
-                *value = besides.with(fields[*way], place % n == place / n);
+            for channel in 0..n {
+                let ways = self.way.column(channel);
+                for (value, way) in block.column_mut(channel).iter_mut().zip(ways.iter()) {
+                    *value = besides.with(fields[*way], false);
+                }
+                let way = ways[channel];
+                block[(channel, channel)] = besides.with(fields[way], true);
             }
             if lag == 0 {
                 let noise = self.noise_mps.iter().enumerate();

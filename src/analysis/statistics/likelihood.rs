@@ -299,8 +299,15 @@ impl Likelihood {
             let clock = (elapsed - half) / half;
             let data = column.as_slice();
             let slope = self.unknown.slope;
+            // Slices of one length: then the loop needs no checks.
+            let (variance, data) = (&modes.variance[..count], &data[..count]);
+            let (p, m, one, time) =
+                (&mut p[..count], &mut m[..count], &mut one[..count], &mut time[..count]);
+            let (squares, determinant) = (&mut squares[..count], &mut determinant[..count]);
+            let (s11, s1y) = (&mut s11[..count], &mut s1y[..count]);
+            let (s1t, stt, sty) = (&mut s1t[..count], &mut stt[..count], &mut sty[..count]);
             for i in 0..count {
-                let (s, prior, y) = (modes.variance[i], p[i], data[i]);
+                let (s, prior, y) = (variance[i], p[i], data[i]);
                 let f = filter.a * filter.a * prior + filter.r * s + noise;
                 let weight = 1.0 / f;
                 let gain = (filter.keep * filter.a * prior + filter.qr * s) * weight;
@@ -322,7 +329,7 @@ impl Likelihood {
                 }
             }
             if block % 16 == 15 || block + 1 == blocks {
-                for determinant in &mut determinant {
+                for determinant in determinant.iter_mut() {
                     ln_determinant += determinant.ln();
                     *determinant = 1.0;
                 }

@@ -48,7 +48,7 @@ impl Seen {
     }
 }
 
-/// What is looked at in one round, and for what.
+/// A flight as it is seen, and all that is sought in it in one round.
 #[derive(Clone)]
 pub(super) struct Look {
     pub seen: Arc<Seen>,
@@ -99,13 +99,13 @@ impl Look {
 }
 
 impl Search<'_> {
-    /// What is left, and everything that may explain it.
+    /// The rest that the model leaves, and everything that may explain it.
     pub(super) fn look(&mut self, updraft: In<'_>) -> Result<Look, GapError> {
         let seen = self.seen(updraft)?;
         self.look_at(Arc::new(seen))
     }
 
-    /// What is left in the present updraft, before anything was found: to each effect that alone is searched for it looks the
+    /// The rest in the present updraft, before anything was found: to each effect that alone is searched for it looks the
     /// same.
     pub(super) fn look_at_beginning(&mut self) -> Result<Look, GapError> {
         let of = (&self.comparison.clone(), self.found.updraft_mps);
