@@ -13,12 +13,30 @@ use super::memory::Digest;
 /// What a flight of the model follows from: the comparison that tells the wind to begin with, and the updraft.
 type Flight = (bool, [u64; 7]);
 
+/// A flight of the model beside a comparison, fitted from some noise and gusts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct View(Flight, Digest);
+
+impl View {
+    /// Of the flight in an updraft, m/s, with gusts, m/s.
+    pub(super) fn of(
+        near: &Comparison,
+        updraft_mps: f64,
+        (start, gusts_mps): (&Start, f64),
+    ) -> Self {
+        let mut digest = Digest::new();
+        start.add_to(&mut digest);
+        digest.add_all(&[gusts_mps]);
+        Self(flight(Some(near), updraft_mps), digest)
+    }
+}
+
 /// What was flown so far with one model against the same logs.
 #[derive(Debug, Default)]
 pub(super) struct ModelFlights {
     flown: Mutex<BTreeMap<Flight, Comparison>>,
-    likely: Mutex<BTreeMap<(Flight, Digest), Option<f64>>>,
-    seen: Mutex<BTreeMap<(Flight, Digest), Arc<Seen>>>,
+    likely: Mutex<BTreeMap<View, Option<f64>>>,
+    seen: Mutex<BTreeMap<View, Arc<Seen>>>,
 }
 
 impl ModelFlights {
@@ -42,46 +60,31 @@ impl ModelFlights {
     }
 
     /// How likely that flight is, nats; `None`: it cannot be flown so.
-    pub(super) fn likely(
-        &self,
-        (near, updraft_mps): (&Comparison, f64),
-        start: (&Start, f64),
-        fit: impl FnOnce() -> Option<f64>,
-    ) -> Option<f64> {
-        let key = (flight(Some(near), updraft_mps), digest(start));
-        if let Some(known) = locked(&self.likely).get(&key) {
+    pub(super) fn likely(&self, view: View, fit: impl FnOnce() -> Option<f64>) -> Option<f64> {
+        if let Some(known) = locked(&self.likely).get(&view) {
             return *known;
         }
         let likely = fit();
-        locked(&self.likely).insert(key, likely);
+        locked(&self.likely).insert(view, likely);
         likely
     }
 
-    /// That flight as it is seen from some noise and gusts.
+    /// That flight as it is seen, looked at if it was not.
     ///
     /// # Errors
     /// Those of `look`.
     pub(super) fn seen(
         &self,
-        (near, updraft_mps): (&Comparison, f64),
-        start: (&Start, f64),
+        view: View,
         look: impl FnOnce() -> Result<Seen, GapError>,
     ) -> Result<Arc<Seen>, GapError> {
-        let key = (flight(Some(near), updraft_mps), digest(start));
-        if let Some(known) = locked(&self.seen).get(&key) {
+        if let Some(known) = locked(&self.seen).get(&view) {
             return Ok(Arc::clone(known));
         }
         let seen = Arc::new(look()?);
-        locked(&self.seen).insert(key, Arc::clone(&seen));
+        locked(&self.seen).insert(view, Arc::clone(&seen));
         Ok(seen)
     }
-}
-
-fn digest((start, gusts_mps): (&Start, f64)) -> Digest {
-    let mut digest = Digest::new();
-    start.add_to(&mut digest);
-    digest.add_all(&[gusts_mps]);
-    digest
 }
 
 /// A search that panicked leaves whole entries behind.
@@ -131,7 +134,8 @@ mod tests {
         let comparison = trial::comparison(&data);
         let flights = ModelFlights::default();
         let likely = |hyper: Hyper, gusts_mps: f64, nats: f64| {
-            flights.likely((&comparison, 0.0), (&hyper.into(), gusts_mps), || Some(nats))
+            let view = View::of(&comparison, 0.0, (&hyper.into(), gusts_mps));
+            flights.likely(view, || Some(nats))
         };
         let mut louder = Hyper::default();
         louder.0[0] += 1.0;

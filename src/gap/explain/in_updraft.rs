@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::super::error::GapError;
 use super::super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
+use super::super::model_flights::View;
 use super::super::noise::{GroupPattern, Hyper};
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
@@ -243,7 +244,8 @@ impl Search<'_> {
         if !self.has_model() {
             return fit();
         }
-        self.flights.likely((&self.comparison, updraft_mps), (noise, self.found.gusts_mps), fit)
+        let view = View::of(&self.comparison, updraft_mps, (noise, self.found.gusts_mps));
+        self.flights.likely(view, fit)
     }
 
     fn fitted_in(&self, updraft_mps: f64, noise: Start) -> Option<f64> {

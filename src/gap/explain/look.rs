@@ -8,6 +8,7 @@ use super::super::candidates::{
 use super::super::error::GapError;
 use super::super::generic::{Generic, all};
 use super::super::gls::{Column, Likelihood, Problem, Split, Start};
+use super::super::model_flights::View;
 use super::super::noise::GroupPattern;
 use super::super::refine::{self, slopes};
 use super::super::response::gusts_mps;
@@ -108,9 +109,10 @@ impl Search<'_> {
     /// The rest in the present updraft, before anything was found: to each effect that alone is searched for it looks the
     /// same.
     pub(super) fn look_at_beginning(&mut self) -> Result<Look, GapError> {
-        let of = (&self.comparison.clone(), self.found.updraft_mps);
-        let (flights, start) = (self.flights, Start::from(self.found.hyper));
-        let seen = flights.seen(of, (&start, self.found.gusts_mps), || {
+        let (found, flights) = (&self.found, self.flights);
+        let noise = (&Start::from(found.hyper), found.gusts_mps);
+        let view = View::of(&self.comparison, found.updraft_mps, noise);
+        let seen = flights.seen(view, || {
             let mut seen = self.seen(In::Present(None))?;
             seen.based = Some(based(&seen.problem(), &seen.start, true));
             Ok(seen)
@@ -181,5 +183,47 @@ impl Search<'_> {
         }
         let drones = comparison.data.counts();
         Ok(Look { seen, candidates, generics, drones, round: OnceLock::new() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::compare::{Comparison, Simulated};
+    use super::super::super::model_flights::ModelFlights;
+    use super::super::super::trial;
+    use super::super::tests::begun;
+    use super::super::{Only, Options};
+    use super::*;
+
+    #[test]
+    fn effects_that_are_each_searched_for_alone_see_the_same_flight() {
+        let data = trial::data(3, |_, bin| 4.0 * bin.climb_mps().abs());
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let flights = ModelFlights::default();
+        let look = |effect: &'static str, gusts_mps: f64| {
+            let only = Some(Only { effect, updraft_mps: 0.0, beaten_nats: 0.0 });
+            let options = Options { only, ..Options::default() };
+            let given = (&simulated, &options, &flights);
+            let mut search = begun(&data, &vehicle, given, comparison.clone());
+            search.found.gusts_mps = gusts_mps;
+            let look = search.look_at_beginning().unwrap();
+            assert_eq!(search.found.gusts_mps, look.seen.gusts_mps);
+            assert!(look.generics.is_empty());
+            look
+        };
+        let effects = ["thrust-curve", "battery", "parasitic-drag"];
+        let looks = effects.map(|effect| look(effect, 0.0));
+        for (effect, there) in effects.iter().zip(&looks) {
+            assert!(Arc::ptr_eq(&there.seen, &looks[0].seen), "{effect} looks again");
+            assert!(!there.candidates.is_empty(), "{effect}");
+            assert!(there.candidates.iter().all(|one| one.name == *effect), "{effect}");
+        }
+        assert!(!Arc::ptr_eq(&look("battery", 0.3).seen, &looks[0].seen), "in other gusts");
+        // What was fitted already is what would be fitted.
+        let round = looks[0].round();
+        let seen = Seen { based: None, ..looks[0].seen.as_ref().clone() };
+        let anew = Look { seen: Arc::new(seen), round: OnceLock::new(), ..looks[0].clone() };
+        assert_eq!(anew.round().best().to_bits(), round.best().to_bits());
     }
 }
