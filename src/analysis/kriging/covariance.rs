@@ -213,7 +213,7 @@ impl Covariance {
         Apart { of: self, seconds: apart_s, nodes, still }
     }
 
-    /// Correlation of the field by the way, (m/s)², and of its slow part, where nothing drifts.
+    /// Covariance of the field by the way alone, (m/s)², and that of its slow part: all that the way counts for where nothing drifts.
     pub(super) fn by_way(&self, way_m: [f64; 3]) -> [f64; 2] {
         let Air { form, sd_mps, .. } = self.air;
         [sd_mps * sd_mps * (-form.fall(self.square(way_m))).exp(), self.slow(way_m, 0.0)]
@@ -295,7 +295,7 @@ impl Apart<'_> {
         sd_mps * sd_mps * self.nodes.iter().map(at).sum::<f64>() + self.of.slow(way_m, self.seconds)
     }
 
-    /// The same where the correlations by the way are known, which count if nothing drifts.
+    /// The same where the covariances by the way are known, which count if nothing drifts.
     pub(super) fn field_by(&self, way_m: [f64; 3], [field, slow]: [f64; 2]) -> f64 {
         match self.still {
             Some(by_time) => field * by_time + slow * (-self.seconds.abs() / SLOW_S).exp(),
