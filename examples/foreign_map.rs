@@ -7,7 +7,8 @@
 //! ```
 //!
 //! With `--indicator=rotor-speed` (or `power`) before the folders the maps are of that indicator; with `--combine` the
-//! errors of all three and of their combination follow each row. A row for each campaign, then means for each kind of air (the folder's name up to its last hyphen).
+//! errors of all three and of their combination follow each row; with `--scales` the scales that were found. A row for each
+//! campaign, then means for each kind of air (the folder's name up to its last hyphen).
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "it prints its result")]
 
@@ -18,7 +19,7 @@ use std::path::Path;
 use updraft::analysis::TruthSeries;
 use updraft::analysis::budget::TruthCheck;
 use updraft::analysis::combine::CombinedMap;
-use updraft::analysis::result::PosteriorMap;
+use updraft::analysis::result::{AirScales, PosteriorMap, PosteriorScale};
 use updraft::analysis::statistics::result::TrueAir;
 use updraft::flight::Indicator;
 use updraft::workflow::analyze::{Analysing, Settings};
@@ -30,23 +31,25 @@ fn main() {
     println!("{HEAD}");
     let (options, folders): (Vec<String>, Vec<String>) =
         std::env::args().skip(1).partition(|word| word.starts_with("--"));
-    let mut settings = Settings::default();
+    let (mut settings, mut has_scales) = (Settings::default(), false);
     for option in &options {
         match option.as_str() {
             "--indicator=rotor-speed" => settings.options.indicator = Indicator::RotorSpeed,
             "--indicator=power" => settings.options.indicator = Indicator::Power,
             "--combine" => settings.combine = true,
+            "--scales" => has_scales = true,
             _ => eprintln!("{option} is not known"),
         }
     }
     for folder in &folders {
         let folder = Path::new(folder);
         match row(folder, &settings) {
-            Ok((row, combined)) => {
+            Ok((row, combined, scales)) => {
                 let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 println!("{name:18} {}", row.words());
-                if let Some(combined) = combined {
-                    println!("{combined}");
+                let scales = scales.filter(|_| has_scales);
+                for line in combined.into_iter().chain(scales) {
+                    println!("{line}");
                 }
                 let kind = name.rsplit_once('-').map_or(name.as_str(), |(kind, _)| kind);
                 kinds.entry(kind.to_owned()).or_default().push(row);
@@ -133,7 +136,10 @@ impl Row {
     }
 }
 
-fn row(folder: &Path, settings: &Settings) -> Result<(Row, Option<String>), Box<dyn Error>> {
+/// Numbers of a campaign, its errors by each indicator, and the scales that were found.
+type Seen = (Row, Option<String>, Option<String>);
+
+fn row(folder: &Path, settings: &Settings) -> Result<Seen, Box<dyn Error>> {
     let host = Quiet::default();
     let mut work = Work::new(folder);
     find(folder, None, &mut work)?;
@@ -207,7 +213,25 @@ fn row(folder: &Path, settings: &Settings) -> Result<(Row, Option<String>), Box<
         ),
         has_scales: f64::from(u8::from(scales.is_some())),
     };
-    Ok((row, combined))
+    Ok((row, combined, scales.map(scales_words)))
+}
+
+fn scales_words(scales: &AirScales) -> String {
+    let words = |scale: &PosteriorScale| {
+        let [low, high] = scale.interval;
+        format!("{:.0} ({low:.0} to {high:.0})", scale.value)
+    };
+    format!(
+        "    {} sd {:.2} m/s, length {} m, time {} s, drift {:.1?} m/s, gusts {:.3} m/s {:.0} s, slow {:.3} m/s",
+        scales.form,
+        scales.sd_mps,
+        words(&scales.length_m),
+        words(&scales.time_s),
+        scales.drift_mps,
+        scales.gust_mps,
+        scales.gust_s,
+        scales.slow_mps,
+    )
 }
 
 /// Errors of each second alone: by each indicator, and by all together.

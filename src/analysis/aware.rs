@@ -103,6 +103,12 @@ impl<'a> Aware<'a> {
         counted.filter_map(|drone| drone.home_m).collect()
     }
 
+    /// Where a drone of a slot hovered in the calibration, show frame, m; `None` if it has no law of its own.
+    pub(super) fn home_m(&self, slot: u16) -> Option<[f64; 2]> {
+        let drone = self.reference.drones.iter().find(|drone| drone.slot == Some(slot))?;
+        drone.home_m.filter(|_| counts(self.reference, drone))
+    }
+
     /// Why that law, in one phrase.
     pub(super) fn law_reason(&self) -> String {
         let Some([line, square]) = self.evidence else { return ASKED_FOR.to_owned() };

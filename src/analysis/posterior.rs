@@ -41,6 +41,7 @@ pub(super) fn seen(
     };
     Some(Drone {
         place_m,
+        calibrated_m: None,
         values,
         slope_share: measured.slope_share,
         own_slope_share: measured.own_slope_share,
@@ -60,6 +61,9 @@ pub(super) fn add(
     if drones.is_empty() {
         return;
     }
+    for (index, drone) in indices.iter().zip(&mut drones) {
+        drone.calibrated_m = map.drones.get(*index).and_then(|drone| aware.home_m(drone.slot?));
+    }
     share_law(&mut drones);
     // Where a drone that is lost would have been in a scan, others come by.
     let lost = if map.is_scan() { Vec::new() } else { lost(map, shared) };
@@ -73,8 +77,7 @@ pub(super) fn add(
         drones: &drones,
         lost_m: &lost_m,
         seconds: map.time_s.len(),
-        calibration: Calibration::new(&aware.zero.windows, &homes_m),
-        slope: aware.slope(),
+        calibration: Calibration::new(&aware.zero.windows, &homes_m, aware.slope()),
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
     let Some(found) = posterior(&input) else { return };

@@ -135,9 +135,13 @@ fn spread(
     let known = |role: Role| role.value(original).unwrap_or(0.0);
     let (mass, thrust) = (known(Role::MassSpread), known(Role::ThrustSpread));
     let expected = mass.hypot(thrust).max(USUAL).max(usual_us / sensitivity);
-    if low <= expected {
+    let ratio = (sd / expected).powi(2);
+    let most = chi2.inverse_cdf(1.0 - SPREAD_ALPHA) / freedom;
+    if ratio <= most {
         return None;
     }
+    // Log-likelihood of offsets whose variance is this many times the expected one, by their own against the expected.
+    let nats = |ratio: f64| 0.5 * count * (ratio - 1.0 - ratio.ln());
     // Thrust makes the response of a drone follow its offset, mass does not.
     let slopes = mean(each.iter().map(|drone| drone.slope))?;
     let cross: f64 =
@@ -188,14 +192,11 @@ fn spread(
             parameters: vec![parameter(by_thrust, mass, thrust)],
         }
     };
-    // Log-likelihood of the offsets by their own spread against the expected one.
-    let ratio = (sd / expected).powi(2);
-    let gain_nats = 0.5 * count * (ratio - 1.0 - ratio.ln());
     Some(Step {
         finding,
-        gain_nats,
-        threshold_nats: SPREAD_NATS,
-        alpha: 0.025,
+        gain_nats: nats(ratio),
+        threshold_nats: nats(most),
+        alpha: SPREAD_ALPHA,
         size_us: sd * sensitivity,
         rivals: Vec::new(),
         shape: None,
@@ -231,8 +232,8 @@ fn response_follows(vehicle: &Vehicle, change: fn(&mut Vehicle)) -> f64 {
     if follows.is_finite() { follows } else { 0.0 }
 }
 
-/// Threshold for a spread, nats: half a squared z of 1.96, an interval of 95 %.
-const SPREAD_NATS: f64 = 1.92;
+/// Share of flights in which drones that differ as usual seem to differ by more: what each round allows itself.
+const SPREAD_ALPHA: f64 = 0.005;
 
 fn correlation(each: &[DroneOffset]) -> f64 {
     let line = Line::through(each.iter().map(|drone| (drone.offset_us, drone.slope)));

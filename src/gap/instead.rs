@@ -11,7 +11,7 @@ use super::decide::{CLASS_NATS, margin_nats};
 use super::dependence::{Dependence, depends_on_climb, depends_on_no_more};
 use super::error::GapError;
 use super::explain::{Found, Left, Only, Options, Searched, Setting};
-use super::search::FLOOR_NATS;
+use super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
 use super::verdict::{Finding, Step, is_strong_wind};
 use crate::effects::{Class, LIBRARY, Role, Signal, Sought, find};
 
@@ -97,28 +97,36 @@ pub(super) fn fewer_instead(
 /// Drags by which a drone reads another wind from its leans.
 const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 
-/// A drag in place of nothing, where it explains a flight clearly better in the wind that its leans tell then: in a strong wind
-/// that was read without it, what nobody knows of that wind hides it. `flown` searches with these options.
+/// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
+/// strong wind that was read without a drag, what nobody knows of that wind hides the drag; and a shape of the climb that could
+/// not be taken in may be an effect in another updraft. `flown` searches with these options.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
-pub(super) fn drag_after_all(
+pub(super) fn effect_after_all(
     found: Found,
     options: &Options,
     flown: impl Fn(&Options) -> Result<Searched, GapError> + Sync,
 ) -> Result<Found, GapError> {
-    let wind = &found.comparison.wind;
+    let Found { comparison, rest, .. } = &found;
+    let wind = &comparison.wind;
     let is_misread = wind.measured.is_none() && is_strong_wind(wind.mean_mps);
-    if !found.steps.is_empty() || !options.updraft || !is_misread {
+    let is_left = rest.gain_nats > rest.threshold_nats
+        && Dependence::of(&rest.candidate) == Some(Dependence::Climb);
+    if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
         return Ok(found);
     }
-    let bins = found.comparison.data.bins_of_groups();
-    let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + FLOOR_NATS);
-    let ended = |role: &Role| {
-        let only = Only { effect: role.place()?.name(), updraft_mps, beaten_nats };
+    let drags = WIND_READERS.iter().filter(|_| is_misread).filter_map(|role| role.place());
+    let mut effects: Vec<&'static str> = drags.map(|place| place.name()).collect();
+    add_new(&mut effects, shapes().filter(|name| is_left && depends_on_climb(name)));
+    let bins = comparison.data.bins_of_groups();
+    let price_nats = if is_left { FREE_FLOOR_NATS } else { FLOOR_NATS };
+    let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + price_nats);
+    let ended = |effect: &&'static str| {
+        let only = Only { effect, updraft_mps, beaten_nats };
         Ended::of(&alone(options, only), &bins, &flown)
     };
-    let better = WIND_READERS.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
+    let better = effects.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
     let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
     Ok(best.map_or(found, |best| best.found))
 }
@@ -150,10 +158,6 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
     add_new(&mut names, all.into_iter().map(|(_, name)| name).filter(|name| lead != Some(name)));
     names.truncate(MOST);
     names.extend(lead);
-    let shapes = || {
-        let all = LIBRARY.iter().map(|effect| effect.definition());
-        all.filter(|one| matches!(one.sought, Sought::Shape { .. }))
-    };
     let unknown: Vec<Dependence> = steps
         .iter()
         .filter_map(|step| match &step.finding {
@@ -170,7 +174,7 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
         })
     };
     if unknown.contains(&Dependence::Climb) || steps.iter().any(is_of_climb) {
-        add_new(&mut names, shapes().map(|one| one.name).filter(|name| depends_on_climb(name)));
+        add_new(&mut names, shapes().filter(|name| depends_on_climb(name)));
     }
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
     // only be that name's stand-in, unless leans tell a drag of the rotors; what is unknown of the climb may be it as well.
@@ -183,6 +187,12 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
         add_new(&mut names, Role::MomentumDrag.place().map(|place| place.name()));
     }
     names
+}
+
+/// Effects of the library that show in the pulse by a shape.
+fn shapes() -> impl Iterator<Item = &'static str> {
+    let all = LIBRARY.iter().map(|effect| effect.definition());
+    all.filter(|one| matches!(one.sought, Sought::Shape { .. })).map(|one| one.name)
 }
 
 /// Adds the names that are not there yet.
@@ -198,14 +208,19 @@ fn add_new(names: &mut Vec<&'static str>, more: impl IntoIterator<Item = &'stati
 fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     let as_it_is = |ended: Ended| Decided { ended, names: Vec::new() };
     let is_single = there.found.steps.len() == 1;
-    let Some(first) = others.first() else { return as_it_is(there) };
     // Where something would be found after all it is not nothing.
-    let is_all = first.found.rest.gain_nats <= first.found.rest.threshold_nats;
-    if first.nats >= there.nats && first.found.steps.is_empty() && is_all {
-        return as_it_is(others.swap_remove(0));
-    }
+    let is_all = |found: &Found| found.rest.gain_nats <= found.rest.threshold_nats;
     let still = others.iter().position(|other| other.found.steps.is_empty());
-    let still = still.map(|place| others.remove(place)).map(|it| (it.nats, it.found.updraft_mps));
+    let mut still = still.map(|place| others.remove(place));
+    let is_nothing = |still: &Ended| {
+        // An effect that no search found must explain clearly more.
+        let is_beaten = others.first().is_some_and(|best| best.nats > still.nats + FLOOR_NATS);
+        still.nats >= there.nats && is_all(&still.found) && !is_beaten
+    };
+    if let Some(still) = still.take_if(|still| is_nothing(still)) {
+        return as_it_is(still);
+    }
+    let still = still.map(|it| (it.nats, it.found.updraft_mps));
     let Some(best) = others.first() else { return as_it_is(there) };
     let gain = |of: &Found| of.steps.iter().map(|step| step.gain_nats).fold(0.0, f64::max);
     // One effect that was not found before is simpler than several of its kind, if it explains nearly as much.
@@ -389,6 +404,12 @@ mod tests {
         assert!(told(ended(-1.0, &["battery"]), nothing()).is_empty());
         assert_eq!(told(ended(1.0, &["battery"]), nothing()), ["battery"]);
         assert_eq!(told(ended(-1.0, &["battery"]), of(9.0)), ["battery"], "something is left");
+        let beside = |nats: f64| {
+            let others = of(5.0).into_iter().chain([ended(nats, &["momentum-drag"])]).rev();
+            told(ended(-1.0, &["battery"]), others.collect())
+        };
+        assert!(beside(7.0).is_empty(), "no search found it");
+        assert_eq!(beside(9.0).concat(), "momentum-drag/battery");
     }
 
     #[test]
@@ -477,7 +498,7 @@ mod tests {
                 there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
                 Ok(Searched { found: there, left: None })
             };
-            let there = drag_after_all(nothing, options, flown).unwrap();
+            let there = effect_after_all(nothing, options, flown).unwrap();
             !there.steps.is_empty()
         };
         let options = Options::default();
@@ -486,5 +507,28 @@ mod tests {
         assert!(!told(15.0, 9.0, &options), "nothing explains nearly as much");
         let still_air = Options { updraft: false, ..options };
         assert!(!told(20.0, 9.0, &still_air), "a table is not flown again");
+    }
+
+    #[test]
+    fn a_shape_of_the_climb_that_was_not_taken_in_may_be_an_effect() {
+        let data = trial::data(2, |_, _| 0.0);
+        let tried = |candidate: &str, gain_nats: f64| {
+            let mut nothing = Found::nothing(trial::comparison(&data));
+            let candidate = candidate.to_owned();
+            nothing.rest = Rest { gain_nats, candidate, threshold_nats: 14.0, ..Rest::default() };
+            let asked = std::sync::Mutex::new(Vec::new());
+            let flown = |options: &Options| {
+                asked.lock().unwrap().push(options.only.unwrap().effect);
+                Ok(Searched { found: Found::nothing(trial::comparison(&data)), left: None })
+            };
+            let there = effect_after_all(nothing, &Options::default(), flown).unwrap();
+            assert!(there.steps.is_empty(), "none of them was found");
+            asked.into_inner().unwrap()
+        };
+        let effects = tried("climb", 15.0);
+        assert!(effects.contains(&"vortex-ring") && effects.contains(&"thrust-curve"));
+        assert!(!effects.contains(&"density"), "of the height");
+        assert_eq!(tried("climb", 14.0), [""; 0], "chance gains as much");
+        assert_eq!(tried("height", 40.0), [""; 0]);
     }
 }

@@ -5,7 +5,7 @@ use super::data::Data;
 use super::error::GapError;
 use super::explain::{Found, Options, Setting, lacked_drag};
 use super::heldout::Case;
-use super::instead::{drag_after_all, fewer_instead};
+use super::instead::{effect_after_all, fewer_instead};
 use super::model_flights::ModelFlights;
 use super::search::FAR_NATS;
 use super::verdict::{Finding, Gap, Step};
@@ -75,7 +75,7 @@ impl Question<'_> {
         }
         let setting = self.setting(train);
         if found.steps.is_empty() {
-            found = drag_after_all(found, self.options, |options| setting.search(options))?;
+            found = effect_after_all(found, self.options, |options| setting.search(options))?;
             if !found.steps.is_empty() {
                 gap = self.case(&found).gap(train, held)?;
             }

@@ -3,10 +3,13 @@
 use super::covariance::Spot;
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::shape::PARAMETERS;
+use crate::numeric::mean;
 
-/// Errors that all drones share: the parameters of the fleet's law, the doubts of the corrections, and
-/// the updraft that is everywhere the same.
-pub(super) const COMMON: usize = PARAMETERS + DOUBTS + 1;
+/// Errors that all drones share: the parameters of the fleet's law, the doubts of the corrections, the gradient of the air
+/// that was in the drones' own calibrations, and the updraft that is everywhere the same.
+pub(super) const COMMON: usize = PARAMETERS + DOUBTS + 3;
+/// First of the two places of the gradient of the drones' constants along x and y, m/s per m.
+pub(super) const GRADIENT: usize = PARAMETERS + DOUBTS;
 /// Place of the updraft that is everywhere the same.
 pub(super) const UNIFORM: usize = COMMON - 1;
 
@@ -30,6 +33,8 @@ pub(in super::super) struct Value {
 pub(in super::super) struct Drone {
     /// Where it was at each second, show frame, m; for a hover always the same.
     pub(in super::super) place_m: Vec<[f64; 3]>,
+    /// Where it hovered in its own calibration, show frame, m; none if it has the fleet's law.
+    pub(in super::super) calibrated_m: Option<[f64; 2]>,
     /// Values at the seconds common to all drones.
     pub(in super::super) values: Vec<Option<Value>>,
     /// Standard error of the fleet's slope as a share of it.
@@ -63,6 +68,7 @@ impl Rows {
     pub(super) fn of(drones: &[Drone], first: usize, step: usize) -> Self {
         let length = drones.iter().map(|drone| drone.values.len()).max().unwrap_or(0);
         let seconds: Vec<usize> = (first..length).step_by(step.max(1)).collect();
+        let off_m = off_centre(drones);
         let mut list = Vec::new();
         let mut place = vec![vec![None; seconds.len()]; drones.len()];
         for (block, second) in seconds.iter().enumerate() {
@@ -71,7 +77,8 @@ impl Rows {
                 let Some((value, place_m)) = value.zip(drone.place_at(*second)) else { continue };
                 let mut common = [0.0; COMMON];
                 common[..PARAMETERS].copy_from_slice(&value.law);
-                common[PARAMETERS..UNIFORM].copy_from_slice(&value.doubts_mps);
+                common[PARAMETERS..GRADIENT].copy_from_slice(&value.doubts_mps);
+                common[GRADIENT..UNIFORM].copy_from_slice(&off_m[index]);
                 common[UNIFORM] = 1.0;
                 place[index][block] = Some(list.len());
                 let velocity_mps = drone.velocity_at(*second);
@@ -83,6 +90,14 @@ impl Rows {
         }
         Self { list, place, seconds }
     }
+}
+
+/// How far each drone was from the middle of the calibration, m; those with the fleet's law are at it.
+fn off_centre(drones: &[Drone]) -> Vec<[f64; 2]> {
+    let calibrated = || drones.iter().filter_map(|drone| drone.calibrated_m);
+    let middle = [0, 1].map(|axis| mean(calibrated().map(|at| at[axis])).unwrap_or_default());
+    let off = |at: [f64; 2]| [at[0] - middle[0], at[1] - middle[1]];
+    drones.iter().map(|drone| drone.calibrated_m.map_or([0.0; 2], off)).collect()
 }
 
 /// No value is known better, m/s: quantization, and small effects that nothing here describes. Chosen.
@@ -113,6 +128,6 @@ impl Drone {
 
     /// Standard error by its own part of its law, m/s: the mean over its values.
     pub(super) fn own_mps(&self) -> f64 {
-        crate::numeric::mean(self.values.iter().flatten().map(|value| value.own_mps)).unwrap_or(0.0)
+        mean(self.values.iter().flatten().map(|value| value.own_mps)).unwrap_or(0.0)
     }
 }

@@ -370,6 +370,7 @@ mod tests {
                     }
                 };
                 Drone {
+                    calibrated_m: Some([12.0 * x, 15.0 * y]),
                     place_m: vec![[12.0 * x, 15.0 * y, 40.0]],
                     values: (0..seconds).map(|second| Some(value(second))).collect(),
                     slope_share: 0.0,

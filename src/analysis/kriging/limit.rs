@@ -40,8 +40,7 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>
     let n = rows.list.len();
     let covariances: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
     let component = input.calibration.known(air)?;
-    let own_us: f64 = air.iter().map(|air| input.calibration.own_us(air).powi(2)).sum();
-    let own_mps = own_us.sqrt() / input.slope.max(1.0);
+    let own_mps = air.iter().fold(0.0_f64, |sum, air| sum.hypot(input.calibration.own_mps(air)));
     let mut of_air = DMatrix::zeros(n, n);
     for (row, one) in rows.list.iter().enumerate() {
         for (column, other) in rows.list[..=row].iter().enumerate() {

@@ -1,9 +1,11 @@
 //! The posterior map of a flight.
 
+use nalgebra::{DMatrix, Matrix2};
+
 use super::adequacy::{Adequacy, judge};
 use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
-use super::data::{Drone, Rows, UNIFORM};
+use super::data::{Drone, GRADIENT, Rows, UNIFORM};
 use super::grid::{Grid, grid};
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
@@ -33,6 +35,9 @@ const UNIFORM_SHARE: f64 = 0.05;
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
 
+/// A gradient of the drones' constants in the search for scales, m/s per m: likewise.
+const GRADIENT_MPS_PER_M: f64 = 0.005;
+
 /// A flight's values with its calibration.
 pub(in super::super) struct Input<'a> {
     /// Drones with values.
@@ -42,8 +47,6 @@ pub(in super::super) struct Input<'a> {
     /// Seconds of the record.
     pub(in super::super) seconds: usize,
     pub(in super::super) calibration: Calibration<'a>,
-    /// Pulse per vertical air speed of the fleet, us/(m/s).
-    pub(in super::super) slope: f64,
     /// Mean wind along show x and y, m/s.
     pub(in super::super) wind_mps: Option<[f64; 2]>,
 }
@@ -122,7 +125,7 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let thermals = record.thermals();
     let own_of = |air: &Air| -> Vec<f64> {
         // Air that each drone met alone in its calibration is in its constant.
-        let own = input.calibration.own_us(air) / input.slope.max(1.0);
+        let own = input.calibration.own_mps(air);
         input.drones.iter().map(|drone| drone.own_mps().max(own)).collect()
     };
     let components = |air: &Air| input.calibration.components(air);
@@ -202,6 +205,10 @@ pub(super) fn prior_factor(component: Option<&Component>, is_uniform: bool) -> C
     for doubt in PARAMETERS..PARAMETERS + DOUBTS {
         prior[(doubt, doubt)] = 1.0;
     }
+    let unknown = Matrix2::identity() * GRADIENT_MPS_PER_M.powi(2);
+    let gradient = component.map_or(unknown, |component| component.gradient);
+    let gradient = factor(&DMatrix::from_column_slice(2, 2, gradient.as_slice()));
+    prior.view_mut((GRADIENT, GRADIENT), (2, 2)).copy_from(&gradient);
     prior[(UNIFORM, UNIFORM)] = if is_uniform { UNIFORM_MPS } else { 0.0 };
     prior
 }

@@ -14,9 +14,12 @@
 mod adequacy;
 mod along;
 mod calibration;
+#[cfg(test)]
+mod calibration_tests;
 mod covariance;
 mod data;
 mod dense;
+mod gradient;
 mod grid;
 mod levinson;
 mod limit;

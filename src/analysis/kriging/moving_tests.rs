@@ -1,6 +1,6 @@
 //! Maps along tracks, in fields that are made of waves: means over 10 s along the way, once a second, with noise.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2};
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::calibration::Component;
@@ -109,6 +109,7 @@ fn flown(case: &Case, seed: u64) -> (Vec<Drone>, Vec<Vec<f64>>) {
         });
         let place_m = (0..seconds).map(|second| place_m(case, index, second as f64)).collect();
         drones.push(Drone {
+            calibrated_m: None,
             place_m,
             values: values.collect(),
             slope_share: 0.0,
@@ -146,7 +147,8 @@ fn mapped(drones: &[Drone]) -> Vec<Series> {
     let zero = |_: &Air| {
         let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
         covariance[(0, 0)] = ZERO_MPS * ZERO_MPS;
-        vec![Component { shift: [0.0; PARAMETERS], covariance, log_weight: 0.0 }]
+        let shift = [0.0; PARAMETERS];
+        vec![Component { shift, covariance, gradient: Matrix2::zeros(), log_weight: 0.0 }]
     };
     let own_of = |_: &Air| own_mps.clone();
     let sampled: Vec<_> =

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::calibration::Calibration;
+use super::calibration_tests::{SLOPE_US, windows as flown_windows};
 use super::covariance::{Air, Covariance, Form};
 use super::data::{COMMON, Drone, Rows, UNIFORM, Value};
 use super::make::{Input, posterior};
@@ -13,7 +14,6 @@ use super::neighbours::{Reach, before};
 use super::predict::{Linear, Model};
 use super::scales::Search;
 use super::vecchia::{Common, CommonVector};
-use crate::analysis::air_prior::Record;
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
@@ -23,7 +23,6 @@ const SPACING_M: f64 = 10.0;
 const NOISE_MPS: f64 = 0.03;
 const OWN_MPS: f64 = 0.04;
 const ZERO_MPS: f64 = 0.1;
-const SLOPE_US: f64 = 25.0;
 
 fn place_m(side: usize, index: usize) -> [f64; 3] {
     [SPACING_M * (index % side) as f64, SPACING_M * (index / side) as f64, 60.0]
@@ -54,8 +53,7 @@ fn flown(side: usize, seconds: usize, seed: u64) -> (Vec<Drone>, Vec<Vec<f64>>) 
                 })
             };
             let values = truth.iter().map(value).collect();
-            let drone =
-                Drone { place_m: vec![place_m], values, slope_share: 0.0, own_slope_share: 0.0 };
+            let drone = Drone { place_m: vec![place_m], values, ..Drone::default() };
             (drone, truth)
         })
         .unzip()
@@ -151,35 +149,15 @@ fn neighbours_stand_for_all_values() {
 
 /// A calibration of seven speeds up and down.
 fn windows() -> Windows {
-    let speeds: Vec<f64> =
-        (1..=7).flat_map(|rung| [0.5, -0.5].map(|speed| speed * f64::from(rung))).collect();
-    let n = speeds.len();
-    let design = DMatrix::from_fn(n + 2, PARAMETERS, |row, column| match speeds.get(row) {
-        Some(speed) => [1.0, *speed, speed * speed, speed * speed.abs()][column],
-        None => f64::from(u8::from(column == row - n + 2)),
-    });
-    let parameters = vec![1546.5, SLOPE_US, 0.0, 0.0];
-    let pulse_us = &design * DVector::from_column_slice(&parameters);
-    let cells = (0..n).map(|index| CellAt {
+    let speeds = (1..=7).flat_map(|rung| [0.5, -0.5].map(|speed| speed * f64::from(rung)));
+    let cell = |(index, climb_mps)| CellAt {
         time_s: 30.0 * index as f64,
         span_s: 9.0,
         height_m: 50.0,
-        climb_mps: speeds[index],
+        climb_mps,
         drones: 16,
-    });
-    Windows {
-        cells: cells.collect(),
-        parameters,
-        record: Record {
-            design,
-            pulse_us,
-            noise_us: vec![1.5; n + 2],
-            sensitivity: (0..n + 2).map(|row| if row < n { SLOPE_US } else { 0.0 }).collect(),
-            time_s: (0..n).map(|index| 30.0 * index as f64).collect(),
-            doubts_us: Vec::new(),
-            windows: n,
-        },
-    }
+    };
+    flown_windows(speeds.enumerate().map(cell).collect(), 1.5, |_| 0.0)
 }
 
 #[test]
@@ -196,8 +174,7 @@ fn thousands_of_drones() {
         drones: &drones,
         lost_m: &[],
         seconds,
-        calibration: Calibration::new(&windows, &homes_m),
-        slope: SLOPE_US,
+        calibration: Calibration::new(&windows, &homes_m, SLOPE_US),
         wind_mps: Some([0.0; 2]),
     };
     let map = posterior(&input).unwrap();

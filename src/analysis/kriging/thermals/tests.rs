@@ -143,8 +143,7 @@ fn drones(fleet: Fleet) -> Vec<Drone> {
     };
     let values: Vec<Option<Value>> =
         (0..fleet.seconds()).map(|second| fleet.has_value(second).then_some(value)).collect();
-    let of =
-        |place_m| Drone { place_m, values: values.clone(), slope_share: 0.0, own_slope_share: 0.0 };
+    let of = |place_m| Drone { place_m, values: values.clone(), ..Drone::default() };
     fleet.places().into_iter().map(of).collect()
 }
 
