@@ -40,11 +40,47 @@ pub(crate) struct Least<const N: usize, T> {
     pub inverse: Inverse<N>,
 }
 
+/// As [`minimise_known`], to where two steps gain less than `enough` each, without a look at whether they do so because the
+/// curvature that was learned on the way is wrong there. For a place to begin at.
+pub(crate) fn minimise_roughly<const N: usize>(
+    start: [f64; N],
+    alike: Option<&Inverse<N>>,
+    enough: f64,
+    function: impl Fn(&[f64; N]) -> f64,
+    gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
+) -> Least<N, f64> {
+    let function = |at: &[f64; N]| {
+        let value = function(at);
+        (value, value)
+    };
+    let slopes = |at: &[f64; N], value: &f64| gradient_at(at, *value);
+    descend(start, alike, End { enough, again: false }, function, slopes)
+}
+
 /// As [`minimise`], of a function that tells with its value what its gradient is made from. The inverse of the second
 /// derivatives of a function that is much like it, if there is one, saves steps.
 pub(crate) fn minimise_known<const N: usize, T>(
     start: [f64; N],
     alike: Option<&Inverse<N>>,
+    function: impl Fn(&[f64; N]) -> (f64, T),
+    gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
+) -> Least<N, T> {
+    descend(start, alike, End { enough: ENOUGH, again: true }, function, gradient_at)
+}
+
+/// Where a search ends.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    /// Two steps that gain less are the last.
+    enough: f64,
+    /// Once more, with a fresh curvature, from where it ends first.
+    again: bool,
+}
+
+fn descend<const N: usize, T>(
+    start: [f64; N],
+    alike: Option<&Inverse<N>>,
+    end: End,
     function: impl Fn(&[f64; N]) -> (f64, T),
     gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
 ) -> Least<N, T> {
@@ -91,8 +127,8 @@ pub(crate) fn minimise_known<const N: usize, T>(
         let gained = value - next_value;
         update(&mut inverse, &difference(&next, &at), &difference(&next_gradient, &gradient));
         (at, value, gradient, known) = (next, next_value, next_gradient, next_known);
-        small = if gained < ENOUGH { small + 1 } else { 0 };
-        if small == 2 && learned.is_some() {
+        small = if gained < end.enough { small + 1 } else { 0 };
+        if small == 2 && (learned.is_some() || !end.again) {
             break;
         }
         if small == 2 {

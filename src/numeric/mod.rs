@@ -27,6 +27,8 @@ mod order;
 
 pub(crate) use banded::Banded;
 pub use line::Line;
-pub(crate) use minimise::{Inverse, Least, differences, minimise, minimise_known};
+pub(crate) use minimise::{
+    Inverse, Least, differences, minimise, minimise_known, minimise_roughly,
+};
 pub use moments::{Moments, mean, rms};
 pub use order::{Sorted, extent, least, median, most, upper_median};

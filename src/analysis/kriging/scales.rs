@@ -10,7 +10,7 @@ use super::dense::Dense;
 use super::levinson::{Blocks, Size};
 use super::neighbours::Neighbours;
 use super::vecchia::{Common, CommonVector, System};
-use crate::numeric::{differences, minimise};
+use crate::numeric::{Inverse, Least, differences, minimise_roughly};
 
 /// Scales that are searched, mostly as logarithms.
 pub(super) const SCALES: usize = 10;
@@ -61,6 +61,11 @@ const SLOPE_STEP: f64 = 1e-4;
 const NATS: f64 = 5.0;
 /// The same where only some of the values were asked.
 const COARSE_NATS: f64 = 12.0;
+
+/// A search ends where two steps gain less than this, nats. Numerical: points are drawn around a top, not from it.
+const ENOUGH: f64 = 2e-3;
+/// The same of one that only finds where another begins.
+const COARSE_ENOUGH: f64 = 0.05;
 
 /// See [`Axis::reach`]. Numerical.
 const LEAST_REACH: f64 = 0.5;
@@ -171,6 +176,23 @@ pub(super) fn open_factor(factor: &Common) -> Common {
     open
 }
 
+/// Where a search for the scales of one form ended.
+#[derive(Clone, Copy, Debug)]
+struct Top {
+    form: Form,
+    best: Point,
+    /// Logarithm of the posterior there.
+    value: f64,
+    /// Inverse of the curvature, as the search learned it.
+    inverse: Inverse<SCALES>,
+}
+
+impl Top {
+    fn of<T>(form: Form, Least { at, value, inverse, .. }: Least<SCALES, T>) -> Self {
+        Self { form, best: at, value: -value, inverse }
+    }
+}
+
 impl Search<'_> {
     /// The air of a point.
     pub(super) fn air(&self, form: Form, point: &Point) -> Air {
@@ -214,10 +236,12 @@ impl Search<'_> {
     }
 
     /// The most probable scales from a start, by some of the values where that is enough to begin with.
-    fn climb(&self, form: Form, start: Point) -> (Point, f64) {
+    fn climb(&self, form: Form, start: Point) -> Top {
         let some = Search { whole: self.coarse.or(self.whole), ..*self };
         let loss = |point: &Point| -some.log_posterior(form, point);
-        minimise(start, loss, |at, value| differences(loss, at, value))
+        let slopes = |at: &Point, value| differences(loss, at, value);
+        let enough = if self.coarse.is_some() { COARSE_ENOUGH } else { ENOUGH };
+        Top::of(form, minimise_roughly(start, None, enough, loss, slopes))
     }
 
     /// The most probable scales, over forms and starts.
@@ -236,34 +260,33 @@ impl Search<'_> {
                 drifts.iter().map(move |drift| (form, *drift))
             })
             .collect();
-        let climbed: Vec<(Form, Point, f64)> = starts
+        let climbed: Vec<Top> = starts
             .par_iter()
             .map(|(form, drift)| {
                 let mut start = start;
                 start[DRIFT] = *drift;
-                let (point, loss) = self.climb(*form, start);
-                (*form, point, -loss)
+                self.climb(*form, start)
             })
             .collect();
-        let mut tops: Vec<(Form, Point, f64)> = Form::ALL
+        let mut tops: Vec<Top> = Form::ALL
             .into_iter()
             .filter_map(|form| {
-                let own = climbed.iter().filter(|(of, _, value)| *of == form && value.is_finite());
-                own.max_by(|a, b| a.2.total_cmp(&b.2)).copied()
+                let own = climbed.iter().filter(|top| top.form == form && top.value.is_finite());
+                own.max_by(|a, b| a.value.total_cmp(&b.value)).copied()
             })
             .collect();
         keep_probable(&mut tops, if self.coarse.is_some() { COARSE_NATS } else { NATS });
         if self.coarse.is_some() {
-            for (form, best, log_posterior) in &mut tops {
-                let loss = |point: &Point| -self.log_posterior(*form, point);
-                let slopes = |at: &Point, value| self.slopes(*form, at, value);
-                let (point, least) = minimise(*best, loss, slopes);
-                (*best, *log_posterior) = (point, -least);
+            for top in &mut tops {
+                let loss = |point: &Point| -self.log_posterior(top.form, point);
+                let slopes = |at: &Point, value| self.slopes(top.form, at, value);
+                let found = minimise_roughly(top.best, Some(&top.inverse), ENOUGH, loss, slopes);
+                *top = Top::of(top.form, found);
             }
             keep_probable(&mut tops, NATS);
         }
         tops.into_iter()
-            .map(|(form, best, log_posterior)| {
+            .map(|Top { form, best, value: log_posterior, .. }| {
                 let covariance = self.curvature(form, &best, log_posterior);
                 let axes = self.axes(form, &best, log_posterior, &covariance);
                 Found { form, best, covariance, axes }
@@ -280,13 +303,8 @@ impl Search<'_> {
             }
             self.log_posterior(form, &point)
         };
-        // Both ways along each axis; a pair's mixed difference is that along its diagonal less those along its axes.
-        let along = |shifts: [(usize, f64); 2]| {
-            let back = shifts.map(|(index, shift)| (index, -shift));
-            value(&shifts) + value(&back) - 2.0 * top
-        };
-        let axes: Vec<f64> =
-            (0..SCALES).into_par_iter().map(|axis| along([(axis, 1.0), (axis, 0.0)])).collect();
+        let ahead: Vec<f64> =
+            (0..SCALES).into_par_iter().map(|axis| value(&[(axis, 1.0)])).collect();
         let pairs: Vec<(usize, usize)> =
             (0..SCALES).flat_map(|row| (0..=row).map(move |column| (row, column))).collect();
         let seconds: Vec<f64> = pairs
@@ -294,9 +312,9 @@ impl Search<'_> {
             .map(|(row, column)| {
                 let (row, column) = (*row, *column);
                 let second = if row == column {
-                    axes[row]
+                    ahead[row] + value(&[(row, -1.0)]) - 2.0 * top
                 } else {
-                    0.5 * (along([(row, 1.0), (column, 1.0)]) - axes[row] - axes[column])
+                    value(&[(row, 1.0), (column, 1.0)]) - ahead[row] - ahead[column] + top
                 };
                 second / (STEP * STEP)
             })
@@ -372,11 +390,11 @@ pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> A
 }
 
 /// Drops forms that are much less probable than another, and puts the most probable first.
-fn keep_probable(tops: &mut Vec<(Form, Point, f64)>, nats: f64) {
-    tops.retain(|(_, _, value)| value.is_finite());
-    tops.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let most = tops.first().map_or(0.0, |(_, _, value)| *value);
-    tops.retain(|(_, _, value)| *value > most - nats);
+fn keep_probable(tops: &mut Vec<Top>, nats: f64) {
+    tops.retain(|top| top.value.is_finite());
+    tops.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let most = tops.first().map_or(0.0, |top| top.value);
+    tops.retain(|top| top.value > most - nats);
 }
 
 /// Logarithm of the prior, but for a constant.
