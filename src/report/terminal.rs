@@ -406,7 +406,7 @@ impl Output {
 
     /// The map as numbers, forward up and left to the left; nothing where places form no small grid.
     fn grid(&mut self, map: &UpdraftMap, largest: f64) {
-        let placed: Vec<([i64; 2], f64, String)> = map
+        let mut placed: Vec<([i64; 2], f64, String)> = map
             .drones
             .iter()
             .filter_map(|drone| {
@@ -416,6 +416,15 @@ impl Output {
                 usable(value).then(|| (cell, value, signed(value, 2)))
             })
             .collect();
+        let filled = map.posterior.iter().flat_map(|map| &map.filled).filter_map(|place| {
+            let [x, y] = place.position_m;
+            let value = crate::numeric::mean(place.posterior_mps.iter().flatten().copied())?;
+            let cell = [(x * 2.0).round() as i64, (y * 2.0).round() as i64];
+            usable(value).then(|| (cell, value, format!("{}*", signed(value, 2))))
+        });
+        let with_logs = placed.len();
+        placed.extend(filled);
+        let is_filled = placed.len() > with_logs;
         let distinct = |axis: usize| {
             let mut values: Vec<i64> = placed.iter().map(|(cell, _, _)| cell[axis]).collect();
             values.sort_unstable();
@@ -431,8 +440,9 @@ impl Output {
         let is_posterior = map.drones.iter().any(|drone| drone.posterior_mean.is_some());
         let means =
             if is_posterior { "Posterior means over the hover" } else { "Means over the hover" };
+        let marks = if is_filled { "* no log, filled from its neighbours" } else { "· no data" };
         let words = format!(
-            "{means} (the paper's Fig. 5, averaged), seen from above, forward is up; · no data"
+            "{means} (the paper's Fig. 5, averaged), seen from above, forward is up; {marks}"
         );
         self.wrapped(DIM, "  ", &words);
         for row in rows {

@@ -27,6 +27,9 @@ const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
 const NORMAL: f64 = 1.96;
 /// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
 const FEWEST: usize = 24;
+/// Fewer drones than this that hover say nothing about lengths: of one or two, 1 to 47 % of the values were inside of intervals that
+/// said 95 (docs/errors.md).
+const FEWEST_DRONES: usize = 3;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
 /// Over level ground there is none in the long run; slopes and waves have one. Chosen: with 0.2 this possibility alone made
 /// the stated error of a field with known scales and gusts a fifth larger (docs/errors.md).
@@ -92,10 +95,10 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let step = RUNNING_S as usize;
     let first = (input.seconds.saturating_sub(1) % step) / 2;
     let rows = Rows::of(input.drones, first, step);
-    if rows.list.len() < FEWEST {
+    let moves = input.drones.iter().any(|drone| !drone.hovers());
+    if rows.list.len() < FEWEST || !moves && input.drones.len() < FEWEST_DRONES {
         return None;
     }
-    let moves = input.drones.iter().any(|drone| !drone.hovers());
     let all = before(input.drones, &rows, if moves { moving::REACH } else { REACH });
     let roughly: Vec<f64> =
         input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();

@@ -36,10 +36,13 @@ impl Extremes {
                 usable(value.value).then_some((value, (drone, *time_s)))
             })
         });
+        let shared_mps = shared_mps(map).unwrap_or(0.0);
         let mut said = Vec::new();
         let mut varies = false;
         match ends(places.clone()) {
-            Some([(high, at_high), (low, at_low)]) if differ(map, [high, low], places.count()) => {
+            Some([(high, at_high), (low, at_low)])
+                if differ(shared_mps, [high, low], places.count()) =>
+            {
                 varies = true;
                 let at = |drone: &DroneUpdraft| place(flight, drone);
                 said.push(format!(
@@ -64,7 +67,7 @@ impl Extremes {
         }
         if let Some([(high, at_high), (low, at_low)]) = ends(seconds.clone())
             // Ten seconds are about one independent value.
-            && differ(map, [high, low], seconds.count() / 10)
+            && differ(shared_mps, [high, low], seconds.count() / 10)
         {
             varies = true;
             let at = |(drone, time_s): (&DroneUpdraft, f64)| {
@@ -88,10 +91,9 @@ impl Extremes {
 }
 
 /// Whether the highest and the lowest of so many values differ by more than the errors that they do not share.
-fn differ(map: &UpdraftMap, ends: [Estimate; 2], values: usize) -> bool {
-    let common = map.common.map_or(0.0, |common| common.se_mps).powi(2);
+fn differ(shared_mps: f64, ends: [Estimate; 2], values: usize) -> bool {
     let own = |of: &Estimate| {
-        let rest = of.se.powi(2) - common;
+        let rest = of.se.powi(2) - shared_mps.powi(2);
         // Where the fleet's share is told otherwise than in this value's error, half of it is its own.
         if rest > 0.0 { rest.sqrt() } else { 0.5 * of.se }
     };
@@ -123,11 +125,20 @@ fn second(drone: &DroneUpdraft, index: usize) -> Option<Estimate> {
     Some(Estimate::new(value, se))
 }
 
+/// Error that all drones share, m/s: of the posterior where the drones' means are its.
+fn shared_mps(map: &UpdraftMap) -> Option<f64> {
+    let is_posterior = map.drones.iter().any(|drone| drone.posterior_mean.is_some());
+    let fleet = map.posterior.as_ref().filter(|_| is_posterior).and_then(|map| map.fleet);
+    let plain = map.common.map(|common| common.se_mps);
+    fleet.map(|fleet| fleet.se).or(plain).filter(|se| usable(*se))
+}
+
 /// Whether most of a middle drone's error is the fleet's.
 fn is_shared(map: &UpdraftMap) -> bool {
-    let Some(common) = map.common.filter(|common| usable(common.se_mps)) else { return false };
-    let errors = map.drones.iter().map(|drone| drone.mean.se).filter(|se| usable(*se));
-    median(errors.collect()).is_some_and(|one| common.se_mps.powi(2) > one.powi(2) / 2.0)
+    let Some(shared_mps) = shared_mps(map) else { return false };
+    let of = |drone: &DroneUpdraft| drone.posterior_mean.unwrap_or(drone.mean).se;
+    let errors = map.drones.iter().map(of).filter(|se| usable(*se));
+    median(errors.collect()).is_some_and(|one| shared_mps.powi(2) > one.powi(2) / 2.0)
 }
 
 fn label(drone: &DroneUpdraft) -> String {
@@ -161,4 +172,16 @@ pub(super) fn moment(when: Option<When>, time_s: f64) -> String {
         || format!("{} s of show time", fixed(time_s, 0)),
         |unix_s| format!("{} UTC", day_and_time(unix_s).1),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_all_share_hides_no_difference() {
+        let ends = [Estimate::new(0.22, 0.25), Estimate::new(-0.33, 0.25)];
+        assert!(differ(0.245, ends, 21), "5 cm/s of its own each");
+        assert!(!differ(0.09, ends, 21));
+    }
 }
