@@ -1,4 +1,4 @@
-//! What a calibration says of the air, by rotors that are no polynomials and drones that stand in a gradient.
+//! Tests of a calibration: what it says of the air, by rotors that are no polynomials and drones that stand in a gradient.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution as _, StandardNormal};
@@ -169,4 +169,31 @@ fn a_plane_of_constants_is_the_calibration_s() {
     let ((known, se_mps), (unknown, _)) = (slopes_mps(true), slopes_mps(false));
     assert!(known.abs() < 0.7 * unknown.abs(), "{known:.3} {unknown:.3}");
     assert!(known.abs() < 2.0 * se_mps, "{known:.3} {se_mps:.3}");
+}
+
+#[test]
+fn two_drones_that_hover_have_no_map_of_the_air() {
+    let homes_m = homes_m();
+    let windows = windows(ladder(), 0.15, |_| 0.0);
+    let has_map = |count: usize| {
+        let value = Value {
+            updraft_mps: 0.0,
+            law: [1.0 / SLOPE_US, 0.0, 0.0, 0.0],
+            doubts_mps: [0.0; DOUBTS],
+            own_mps: 0.03,
+            noise_mps: 0.02,
+        };
+        let drone = |[x, y]: &[f64; 2]| Drone {
+            place_m: vec![[*x, *y, 60.0]],
+            values: vec![Some(value); 300],
+            ..Drone::default()
+        };
+        let drones: Vec<Drone> = homes_m.iter().take(count).map(drone).collect();
+        let calibration = Calibration::new(&windows, &homes_m, SLOPE_US);
+        let input =
+            Input { drones: &drones, lost_m: &[], seconds: 300, calibration, wind_mps: None };
+        posterior(&input).is_some()
+    };
+    assert!(!has_map(1) && !has_map(2));
+    assert!(has_map(3));
 }

@@ -41,9 +41,12 @@ fn flown(template: &str, side: i64, own: Override, kind: &str, seed: u64) -> [Tr
 #[test]
 fn the_posterior_is_near_the_best_linear_estimate() {
     let mut sums = [0.0; 4];
-    let mut inside = 0.0;
-    let kinds = ["field", "gusty", "advected"];
-    for (kind, seed) in kinds.into_iter().zip([1701, 1801, 1901]) {
+    let mut inside = Vec::new();
+    let first = [("field", 1701), ("gusty", 1801), ("advected", 1901)];
+    // A zero counts once for all values of its campaign, and in the first two of them it is so far off that who knows
+    // everything is off by 0.6 m/s as well: three campaigns say little of intervals.
+    let more = first.into_iter().flat_map(|(kind, seed)| [1, 2].map(|next| (kind, seed + next)));
+    for (index, (kind, seed)) in first.into_iter().chain(more).enumerate() {
         let hover_s = Override::new("duration_s", 180.0);
         let [plain, posterior] = flown("campaign", 4, hover_s, kind, seed);
         let (limit, at_limit) =
@@ -55,11 +58,14 @@ fn the_posterior_is_near_the_best_linear_estimate() {
             posterior.rms_without_bias_mps,
             100.0 * posterior.inside_share,
         );
-        let squares = [plain.rms_mps, limit, at_limit, posterior.rms_without_bias_mps];
-        sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value * value);
-        inside += posterior.inside_share / kinds.len() as f64;
+        inside.push(posterior.inside_share);
+        if index < first.len() {
+            let squares = [plain.rms_mps, limit, at_limit, posterior.rms_without_bias_mps];
+            sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value * value);
+        }
     }
-    let [plain, limit, at_limit, rest] = sums.map(|sum: f64| (sum / kinds.len() as f64).sqrt());
+    let [plain, limit, at_limit, rest] = sums.map(|sum: f64| (sum / first.len() as f64).sqrt());
+    let inside = inside.iter().sum::<f64>() / inside.len() as f64;
     println!(
         "plain {plain:.3}, limit {limit:.3}, there {at_limit:.3}, rest {rest:.3}, inside {inside:.2}"
     );
