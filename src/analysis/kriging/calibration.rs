@@ -223,8 +223,8 @@ impl<'a> Calibration<'a> {
         (0..cells.len()).map(|row| answers(row) * of(row)).sum::<f64>().max(0.0)
     }
 
-    /// Standard error of one drone's constant against the fleet's, and what all have of the same gradient, by air that it met
-    /// alone, m/s.
+    /// Standard error of one drone's constant by air that it met alone, against the fleet's constant and the plane over all
+    /// drones' places, m/s.
     pub(super) fn own_mps(&self, air: &Air) -> f64 {
         let covariance = Covariance::new(*air);
         let Windows { record, cells, .. } = self.windows;
