@@ -16,12 +16,7 @@ pub(crate) fn minimise<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> ([f64; N], f64) {
-    let function = |at: &[f64; N]| {
-        let value = function(at);
-        (value, value)
-    };
-    let slopes = |at: &[f64; N], value: &f64| gradient_at(at, *value);
-    let Least { at, value, .. } = minimise_known(start, None, function, slopes);
+    let Least { at, value, .. } = of_values(start, None, End::WELL, function, gradient_at);
     (at, value)
 }
 
@@ -49,12 +44,7 @@ pub(crate) fn minimise_roughly<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> Least<N, f64> {
-    let function = |at: &[f64; N]| {
-        let value = function(at);
-        (value, value)
-    };
-    let slopes = |at: &[f64; N], value: &f64| gradient_at(at, *value);
-    descend(start, alike, End { enough, again: false }, function, slopes)
+    of_values(start, alike, End { enough, again: false }, function, gradient_at)
 }
 
 /// As [`minimise`], of a function that tells with its value what its gradient is made from. The inverse of the second
@@ -65,7 +55,7 @@ pub(crate) fn minimise_known<const N: usize, T>(
     function: impl Fn(&[f64; N]) -> (f64, T),
     gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
 ) -> Least<N, T> {
-    descend(start, alike, End { enough: ENOUGH, again: true }, function, gradient_at)
+    descend(start, alike, End::WELL, function, gradient_at)
 }
 
 /// Where a search ends.
@@ -77,6 +67,26 @@ struct End {
     again: bool,
 }
 
+impl End {
+    const WELL: Self = Self { enough: ENOUGH, again: true };
+}
+
+/// As [`descend`], of a function that tells its value alone.
+fn of_values<const N: usize>(
+    start: [f64; N],
+    alike: Option<&Inverse<N>>,
+    end: End,
+    function: impl Fn(&[f64; N]) -> f64,
+    gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
+) -> Least<N, f64> {
+    let told = |at: &[f64; N]| {
+        let value = function(at);
+        (value, value)
+    };
+    descend(start, alike, end, told, |at, value| gradient_at(at, *value))
+}
+
+/// BFGS steps from a start to where a search ends.
 fn descend<const N: usize, T>(
     start: [f64; N],
     alike: Option<&Inverse<N>>,

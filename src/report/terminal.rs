@@ -6,6 +6,7 @@ use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, UpdraftMap}
 use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
+use crate::numeric::mean;
 
 use super::compare::{
     better_words, clock, compared, comparison, drone_laws, drones_of, flock_lines, no_measurement,
@@ -406,21 +407,20 @@ impl Output {
 
     /// The map as numbers, forward up and left to the left; nothing where places form no small grid.
     fn grid(&mut self, map: &UpdraftMap, largest: f64) {
+        let cell = |place_m: [f64; 2]| place_m.map(|along| (along * 2.0).round() as i64);
         let mut placed: Vec<([i64; 2], f64, String)> = map
             .drones
             .iter()
             .filter_map(|drone| {
-                let [x, y] = drone.position_m.filter(|p| usable(p[0]) && usable(p[1]))?;
-                let cell = [(x * 2.0).round() as i64, (y * 2.0).round() as i64];
+                let place_m = drone.position_m.filter(|p| usable(p[0]) && usable(p[1]))?;
                 let value = drone.posterior_mean.unwrap_or(drone.mean).value;
-                usable(value).then(|| (cell, value, signed(value, 2)))
+                usable(value).then(|| (cell(place_m), value, signed(value, 2)))
             })
             .collect();
         let filled = map.posterior.iter().flat_map(|map| &map.filled).filter_map(|place| {
-            let [x, y] = place.position_m;
-            let value = crate::numeric::mean(place.posterior_mps.iter().flatten().copied())?;
-            let cell = [(x * 2.0).round() as i64, (y * 2.0).round() as i64];
-            usable(value).then(|| (cell, value, format!("{}*", signed(value, 2))))
+            let value = mean(place.posterior_mps.iter().flatten())?;
+            let text = format!("{}*", signed(value, 2));
+            usable(value).then_some((cell(place.position_m), value, text))
         });
         let with_logs = placed.len();
         placed.extend(filled);
@@ -440,9 +440,9 @@ impl Output {
         let is_posterior = map.drones.iter().any(|drone| drone.posterior_mean.is_some());
         let means =
             if is_posterior { "Posterior means over the hover" } else { "Means over the hover" };
-        let marks = if is_filled { "* no log, filled from its neighbours" } else { "· no data" };
+        let filled = if is_filled { ", * filled from its neighbours" } else { "" };
         let words = format!(
-            "{means} (the paper's Fig. 5, averaged), seen from above, forward is up; {marks}"
+            "{means} (the paper's Fig. 5, averaged), seen from above, forward is up; · no data{filled}"
         );
         self.wrapped(DIM, "  ", &words);
         for row in rows {

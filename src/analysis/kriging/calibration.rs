@@ -24,8 +24,8 @@ const WHITES_US: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 const OWN_WHITE_US: f64 = 1.0;
 /// How far the pulse of a rotor is from the fleet's law in a climb, m/s (standard deviation): no rotor is a polynomial, and with
 /// none of it half a microsecond that comes again at each speed is taken for air that changes within tens of metres of height.
-/// Chosen, with [`MISFIT_CLIMB_MPS`]: of those tried on six calibrations of foreign rotors it explains 5 to 30 nats more than
-/// none.
+/// Chosen, with [`MISFIT_CLIMB_MPS`]: on four calibrations of foreign rotors it explains 12 to 21 nats more than none in air of the
+/// true length.
 const MISFIT_MPS: f64 = 0.075;
 /// Climb speeds that differ by this differ in it, m/s.
 const MISFIT_CLIMB_MPS: f64 = 1.0;
@@ -76,7 +76,9 @@ pub(in super::super) struct Calibration<'a> {
     homes_m: &'a [[f64; 2]],
     /// Pulse per vertical air speed of the fleet, us/(m/s).
     slope: f64,
-    /// How many these are.
+    /// How far windows are from the fleet's law by how fast they climb, (m/s)².
+    misfit: DMatrix<f64>,
+    /// How many stand for all.
     stand_ins: f64,
     /// Drones in a window, on average.
     drones: f64,
@@ -97,12 +99,17 @@ impl<'a> Calibration<'a> {
                 pairs_m.push([one[0] - other[0], one[1] - other[1]]);
             }
         }
-        let members = windows.cells.iter().map(|cell| cell.drones as f64);
+        let cells = &windows.cells;
+        let misfit = DMatrix::from_fn(cells.len(), cells.len(), |row, column| {
+            cells[row].misfit(&cells[column])
+        });
+        let members = cells.iter().map(|cell| cell.drones as f64);
         Self {
             windows,
             pairs_m,
             homes_m,
             slope: slope.max(1.0),
+            misfit,
             stand_ins: count.max(1) as f64,
             drones: crate::numeric::mean(members).unwrap_or(1.0).max(1.0),
         }
@@ -144,31 +151,35 @@ impl<'a> Calibration<'a> {
         (shared + of_all, [own - shared, gusts - of_all])
     }
 
+    /// The air between all windows.
+    fn between(&self, covariance: &Covariance, taller: f64) -> Between {
+        let cells = &self.windows.cells;
+        let mut found = Between::none(cells.len());
+        for row in 0..cells.len() {
+            for column in 0..=row {
+                let (shared, [by_field, by_gusts]) =
+                    self.air(covariance, &cells[row], &cells[column], taller);
+                for at in [(row, column), (column, row)] {
+                    found.shared[at] = shared;
+                    found.by_field[at] = by_field;
+                    found.by_gusts[at] = by_gusts;
+                }
+            }
+        }
+        found
+    }
+
     /// The fleet's law under all that is left open in air of these scales.
     pub(super) fn components(&self, air: &Air) -> Vec<Component> {
         let covariance = Covariance::new(*air);
-        let cells = &self.windows.cells;
         let plane = Plane::of(&[covariance], self.homes_m);
         let mut found = Vec::new();
         for (taller, tall_weight) in TALLER {
-            let (mut shared, mut alone) = (square(cells.len()), square(cells.len()));
-            for row in 0..cells.len() {
-                for column in 0..=row {
-                    let (of_all, [by_field, _]) =
-                        self.air(&covariance, &cells[row], &cells[column], taller);
-                    (shared[(row, column)], shared[(column, row)]) = (of_all, of_all);
-                    (alone[(row, column)], alone[(column, row)]) = (by_field, by_field);
-                }
-            }
+            let air = self.between(&covariance, taller);
             for (strength, weight) in STRENGTHS {
                 for white_us in WHITES_US {
-                    let square = strength * strength;
-                    let air = |row: usize, column: usize| {
-                        square * shared[(row, column)] + cells[row].misfit(&cells[column])
-                    };
-                    let alone = |row: usize, column: usize| square * alone[(row, column)];
                     let ln_weight = (weight * tall_weight).ln();
-                    found.extend(self.component(air, alone, &plane, white_us, ln_weight));
+                    found.extend(self.component(&air, strength, &plane, white_us, ln_weight));
                 }
             }
         }
@@ -178,31 +189,31 @@ impl<'a> Calibration<'a> {
     /// The fleet's law in air of known scales, alike in all directions and as strong as they say.
     pub(super) fn known(&self, air: &[Air]) -> Option<Component> {
         let air: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
-        let cells = &self.windows.cells;
-        let each = |row: usize, column: usize| {
-            air.iter().map(move |part| self.air(part, &cells[row], &cells[column], 1.0))
-        };
-        let shared = |row: usize, column: usize| {
-            let air: f64 = each(row, column).map(|(shared, _)| shared).sum();
-            air + cells[row].misfit(&cells[column])
-        };
-        let alone = |row, column| each(row, column).map(|(_, [by_field, _])| by_field).sum();
-        let plane = Plane::of(&air, self.homes_m);
-        self.component(shared, alone, &plane, WHITES_US[0], 0.0)
+        let mut all = Between::none(self.windows.cells.len());
+        for part in &air {
+            let Between { shared, by_field, by_gusts } = self.between(part, 1.0);
+            all.shared += shared;
+            all.by_field += by_field;
+            all.by_gusts += by_gusts;
+        }
+        self.component(&all, 1.0, &Plane::of(&air, self.homes_m), WHITES_US[0], 0.0)
     }
 
-    /// The fleet's law in air with a covariance between windows; `None` where they do not determine it.
+    /// The fleet's law in air that is so many times as strong; `None` where the windows do not determine it.
     fn component(
         &self,
-        air: impl Fn(usize, usize) -> f64,
-        alone: impl Fn(usize, usize) -> f64,
+        air: &Between,
+        strength: f64,
         plane: &Plane,
         white_us: f64,
         ln_weight: f64,
     ) -> Option<Component> {
         let Windows { record, parameters, .. } = self.windows;
-        let fit = record.fit_in(air, white_us)?;
-        let gradient = plane.slopes * (self.by_air_us2(&fit, alone) / self.slope.powi(2));
+        let square = strength * strength;
+        let shared = |row, column| square * air.shared[(row, column)] + self.misfit[(row, column)];
+        let fit = record.fit_in(shared, white_us)?;
+        let by_field_us2 = square * self.by_air_us2(&fit, &air.by_field);
+        let gradient = plane.slopes * (by_field_us2 / self.slope.powi(2));
         let Gls { gain, covariance, log_likelihood } = fit;
         let law = gain * &record.pulse_us;
         let mut shift = [0.0; PARAMETERS];
@@ -214,34 +225,45 @@ impl<'a> Calibration<'a> {
     }
 
     /// Variance of the constant that a fit gives by air between windows, us².
-    fn by_air_us2(&self, fit: &Gls, air: impl Fn(usize, usize) -> f64) -> f64 {
+    fn by_air_us2(&self, fit: &Gls, air: &DMatrix<f64>) -> f64 {
         let Windows { record, cells, .. } = self.windows;
-        let answers = |window: usize| fit.gain[(0, window)] * record.sensitivity[window];
-        let of = |row: usize| {
-            (0..cells.len()).map(|column| answers(column) * air(row, column)).sum::<f64>()
-        };
-        (0..cells.len()).map(|row| answers(row) * of(row)).sum::<f64>().max(0.0)
+        let answers = DVector::from_fn(cells.len(), |window, _| {
+            fit.gain[(0, window)] * record.sensitivity[window]
+        });
+        answers.dot(&(air * &answers)).max(0.0)
     }
 
     /// Standard error of one drone's constant by air that it met alone, against the fleet's constant and the plane over all
     /// drones' places, m/s.
     pub(super) fn own_mps(&self, air: &Air) -> f64 {
         let covariance = Covariance::new(*air);
-        let Windows { record, cells, .. } = self.windows;
-        let parts =
-            |row: usize, column: usize| self.air(&covariance, &cells[row], &cells[column], 1.0).1;
-        let all = |row: usize, column: usize| parts(row, column).iter().sum();
-        let own_us2 = record.fit_in(all, OWN_WHITE_US).map(|fit| {
-            let by_field_us2 = self.by_air_us2(&fit, |row, column| parts(row, column)[0]);
+        let Between { by_field, by_gusts, .. } = self.between(&covariance, 1.0);
+        let alone = |row, column| by_field[(row, column)] + by_gusts[(row, column)];
+        let own_us2 = self.windows.record.fit_in(alone, OWN_WHITE_US).map(|fit| {
             let plane = Plane::of(&[covariance], self.homes_m);
-            fit.covariance[(0, 0)] - plane.share * by_field_us2
+            fit.covariance[(0, 0)] - plane.share * self.by_air_us2(&fit, &by_field)
         });
         own_us2.map_or(0.0, |us2| us2.max(0.0).sqrt() / self.slope)
     }
 }
 
-fn square(size: usize) -> DMatrix<f64> {
-    DMatrix::zeros(size, size)
+/// Covariances of the air in the windows of a calibration, each with each, (m/s)².
+#[derive(Clone, Debug)]
+struct Between {
+    /// Of the averages over drones.
+    shared: DMatrix<f64>,
+    /// Of one drone's own deviation from them, by the field.
+    by_field: DMatrix<f64>,
+    /// The same by its own gusts.
+    by_gusts: DMatrix<f64>,
+}
+
+impl Between {
+    /// No air in so many windows.
+    fn none(windows: usize) -> Self {
+        let none = DMatrix::zeros(windows, windows);
+        Self { shared: none.clone(), by_field: none.clone(), by_gusts: none }
+    }
 }
 
 /// A factor `L` of a covariance, `L L'`, that need not be positive definite.

@@ -64,11 +64,11 @@ fn ladder() -> Vec<CellAt> {
     (1..=7).flat_map(rung).collect()
 }
 
-fn homes_m() -> Vec<[f64; 2]> {
+pub(super) fn homes_m() -> Vec<[f64; 2]> {
     (0..25).map(|index| [10.0 * f64::from(index % 5), 10.0 * f64::from(index / 5)]).collect()
 }
 
-fn air(length_m: f64) -> Air {
+pub(super) fn air(length_m: f64) -> Air {
     Air {
         form: Form::Gaussian,
         sd_mps: 0.5,

@@ -56,38 +56,22 @@ impl Plane {
 
 #[cfg(test)]
 mod tests {
-    use super::super::covariance::{Air, Form};
+    use super::super::calibration_tests::{air, homes_m};
     use super::*;
 
     fn in_field(length_m: f64, homes_m: &[[f64; 2]]) -> Plane {
-        let air = Air {
-            form: Form::Gaussian,
-            sd_mps: 0.5,
-            length_m,
-            stretch: [0.0; 2],
-            time_s: 200.0,
-            drift_mps: [0.0; 2],
-            gust_mps: 0.0,
-            gust_s: 1.0,
-            shared_mps: 0.0,
-            slow_mps: 0.0,
-        };
-        Plane::of(&[Covariance::new(air)], homes_m)
-    }
-
-    fn grid() -> Vec<[f64; 2]> {
-        (0..25).map(|index| [10.0 * f64::from(index % 5), 10.0 * f64::from(index / 5)]).collect()
+        Plane::of(&[Covariance::new(air(length_m))], homes_m)
     }
 
     #[test]
     fn a_long_field_leaves_a_plane_and_a_short_one_does_not() {
-        let long = in_field(200.0, &grid());
+        let long = in_field(200.0, &homes_m());
         assert!(long.share > 0.98, "{long:?}");
         // A plane of equal slopes both ways has the whole variance: 200 m² along each axis.
         let slope = long.slopes[(0, 0)];
         assert!((slope * 400.0 - long.share).abs() < 1e-6, "{long:?}");
         assert!(long.slopes[(0, 1)].abs() < 1e-9);
-        let short = in_field(3.0, &grid());
+        let short = in_field(3.0, &homes_m());
         // Two of the 24 directions in which 25 drones differ.
         assert!((short.share - 2.0 / 24.0).abs() < 0.01, "{short:?}");
     }

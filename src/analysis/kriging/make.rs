@@ -27,7 +27,7 @@ const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
 const NORMAL: f64 = 1.96;
 /// Fewer values than this, one in 10 s of each drone, say nothing about scales. Chosen.
 const FEWEST: usize = 24;
-/// Fewer drones than this that hover say nothing about lengths: of one or two, 1 to 47 % of the values were inside of intervals that
+/// Fewer drones than this that hover say nothing about lengths: of one or two, 1 to 80 % of the values were inside of intervals that
 /// said 95 (docs/errors.md).
 const FEWEST_DRONES: usize = 3;
 /// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
