@@ -7,6 +7,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
 use std::time::Duration;
 
 use rayon::prelude::*;
@@ -179,12 +180,19 @@ pub fn serve_with<'w, T>(
         busy: AtomicU64::new(0),
         refused: AtomicU64::new(0),
     };
+    let (begins, begun) = mpsc::channel();
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("virtual fleet".to_owned())
-            .spawn_scoped(scope, || run(posts, broadcasts, options, clock, &running))
+            .spawn_scoped(scope, || {
+                // A clock that is shared waits for those who have waited once.
+                clock.pause(Duration::ZERO);
+                let _ = begins.send(());
+                run(posts, broadcasts, options, clock, &running)
+            })
             .map_err(ServerError::Thread)?;
         let stop = StopAtEnd(&running);
+        begun.recv().map_err(|_| ServerError::Died)?;
         let given = body(&running);
         drop(stop);
         let vehicles = thread.join().map_err(|_| ServerError::Died)?;

@@ -2,6 +2,7 @@
 
 use std::net::UdpSocket;
 use std::sync::Arc;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 use updraft::link::clock::{Clock, MS, S, SystemClock};
@@ -20,6 +21,7 @@ use updraft::virtual_fleet::server::{
 use updraft::virtual_fleet::storage::MemoryStorage;
 use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
+use updraft::workflow::clock::SharedClock;
 
 use super::support::{Field, file, gps_at, ladder, log_of, read, show_of, tow_at};
 use crate::ports::free_port;
@@ -234,4 +236,23 @@ fn a_speed_of_nothing_is_refused() {
         assert!(matches!(error, ServerError::Pace(_)));
         assert!(error.to_string().ends_with("give a number above 0 and at most 1000"));
     }
+}
+
+#[test]
+fn a_clock_that_is_shared_waits_for_the_fleet_from_the_first_instant() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = SharedClock::open(1_800_000_000, &folder.path().join("time")).unwrap();
+    let options = ServerOptions {
+        stations: vec![free_port()],
+        key: None,
+        pace: Pace::Speed(1.0),
+        faults: Faults::default(),
+        seed: 1,
+    };
+    let body = |running: &Running| {
+        clock.pause(Duration::from_secs(10));
+        running.now()
+    };
+    let (now, _) = serve(Vec::new(), &options, &clock, body).unwrap();
+    assert!((9 * S..=10 * S).contains(&now), "{now}");
 }
