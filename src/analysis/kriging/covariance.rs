@@ -57,7 +57,8 @@ impl Form {
 }
 
 /// Length of the slow part of air that varies on two scales, m: that of updrafts over a field (docs/physics.md, 4.1). One
-/// field would take the scale of the gusts that it shows most of, and know the zero by hundreds of them.
+/// field would take the scale of the gusts that it shows most of, and know the zero by hundreds of them. It does not drift: gusts
+/// go with the wind over updrafts that stay.
 const SLOW_M: f64 = 145.0;
 /// Its time, s.
 const SLOW_S: f64 = 186.0;
@@ -219,13 +220,12 @@ impl Covariance {
         [sd_mps * sd_mps * (-form.fall(self.square(way_m))).exp(), self.slow(way_m, 0.0)]
     }
 
-    /// Covariance of the slow part, which means over 10 s do not change, (m/s)².
+    /// Covariance of the slow part, which stays where it is and which means over 10 s do not change, (m/s)².
     pub(super) fn slow(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
-        let Air { slow_mps, drift_mps: [u, v], .. } = self.air;
+        let slow_mps = self.air.slow_mps;
         if slow_mps == 0.0 {
             return 0.0;
         }
-        let (x, y) = (x - u * apart_s, y - v * apart_s);
         slow_mps
             * slow_mps
             * (-(x * x + y * y + z * z).sqrt() / SLOW_M - apart_s.abs() / SLOW_S).exp()

@@ -30,6 +30,35 @@ pub(in super::super) struct Grid {
     pub(in super::super) sd_mps: Vec<Vec<Vec<Option<f64>>>>,
 }
 
+impl Grid {
+    /// Adds to the value of each cell that is known at each second, m/s.
+    pub(super) fn add(&mut self, by_mps: impl Fn([f64; 3], usize) -> f64) {
+        for (second, rows) in self.seconds.iter().zip(&mut self.mean_mps) {
+            for (y_m, row) in self.y_m.iter().zip(rows) {
+                for (x_m, value) in self.x_m.iter().zip(row) {
+                    if let Some(value) = value {
+                        *value += by_mps([*x_m, *y_m, self.height_m], *second);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Widens standard deviations by how far others of the same cells are off.
+    pub(super) fn widen<'a>(&mut self, others: impl Iterator<Item = &'a Self>) {
+        for other in others {
+            let own = self.mean_mps.iter().flatten().flatten();
+            let sds = self.sd_mps.iter_mut().flatten().flatten();
+            let there = other.mean_mps.iter().flatten().flatten();
+            for ((value, sd), there) in own.zip(sds).zip(there) {
+                if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
+                    *sd = sd.hypot(there - value);
+                }
+            }
+        }
+    }
+}
+
 /// The grid over the drones and the places without a log; `None` where drones move, or stand in one place.
 pub(super) fn grid(model: &Model<'_>, lost_m: &[[f64; 3]], first: usize) -> Option<Grid> {
     if !model.drones.iter().all(Drone::hovers) {

@@ -6,21 +6,24 @@ use super::adequacy::{Adequacy, judge};
 use super::calibration::{Calibration, Component, factor};
 use super::covariance::{Air, Covariance};
 use super::data::{Drone, GRADIENT, Rows, UNIFORM};
-use super::grid::{Grid, grid};
+use super::grid::Grid;
 use super::moving;
 use super::neighbours::{Neighbours, Reach, before};
 use super::predict::{Linear, Model, Series};
+use super::predicted::{Predicted, Sites};
 use super::sampling::{Drawn, Sampled, samples};
 use super::scales::{
     COARSE, FINE, Found, LN_LENGTH, LN_TIME, Search, UNIFORM_MPS, Whole, log_prior, open_factor,
 };
-use super::thermals::{Record, Thermal};
+use super::thermals::{Record, Thermal, asides, less};
 use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovations};
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::running::RUNNING_S;
 use crate::analysis::shape::PARAMETERS;
 use crate::numeric::rms;
 
+/// Seconds between rows, which share none.
+const STEP: usize = RUNNING_S as usize;
 /// What the likelihood conditions on.
 const REACH: Reach = Reach { beside: 7, step: 7, own: 2 };
 /// Standard deviations to each side of a normal 95 % interval.
@@ -92,102 +95,175 @@ pub(super) struct Choice {
 
 /// The posterior map; `None` with too few values, or where none of the scales fits at all.
 pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
-    let step = RUNNING_S as usize;
-    let first = (input.seconds.saturating_sub(1) % step) / 2;
-    let rows = Rows::of(input.drones, first, step);
-    let moves = input.drones.iter().any(|drone| !drone.hovers());
-    if rows.list.len() < FEWEST || !moves && input.drones.len() < FEWEST_DRONES {
-        return None;
-    }
-    let all = before(input.drones, &rows, if moves { moving::REACH } else { REACH });
-    let roughly: Vec<f64> =
-        input.drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect();
-    let slope_share = rms(input.drones.iter().map(|drone| drone.own_slope_share)).unwrap_or(0.0);
-    let (fine, coarse) =
-        (Whole::of(input.drones, &rows, FINE), Whole::of(input.drones, &rows, COARSE));
-    let search = Search {
-        rows: &rows,
-        neighbours: &all,
-        whole: Some(&fine),
-        coarse: Some(&coarse),
-        own_mps: &roughly,
-        slope_share,
-        wind_mps: input.wind_mps,
-        factor: open_factor(&prior_factor(None, false)),
-    };
-    let mut forms = search.all();
-    let mut search = search;
-    if let (true, None) = (moves, input.wind_mps) {
-        search.wind_mps = moving::drift(&search, forms.first()?);
-        if search.wind_mps.is_some() {
-            forms = search.all();
-        }
-    }
-    let found = forms.first()?;
+    let values = Values::of(input, input.drones)?;
+    let (search, families) = values.scales(input.wind_mps)?;
+    let found = families.first()?;
     let record = Record { search: &search, drones: input.drones, found, wind_mps: input.wind_mps };
     let thermals = record.thermals();
+    if thermals.is_empty() {
+        return mapped(input, &values, search, &families, thermals);
+    }
+    // A thermal is no part of a stationary field: what is left without it is.
+    let rest = less(input.drones, &thermals);
+    let values = Values::of(input, &rest)?;
+    let (search, families) = values.scales(input.wind_mps)?;
+    mapped(input, &values, search, &families, thermals)
+}
+
+/// Values with what their likelihood needs.
+struct Values<'a> {
+    drones: &'a [Drone],
+    /// Second of the first rows.
+    first: usize,
+    rows: Rows,
+    neighbours: Neighbours,
+    fine: Whole,
+    coarse: Whole,
+    roughly_mps: Vec<f64>,
+    slope_share: f64,
+    moves: bool,
+}
+
+impl<'a> Values<'a> {
+    /// `None` if there are too few.
+    fn of(input: &Input<'_>, drones: &'a [Drone]) -> Option<Self> {
+        let first = (input.seconds.saturating_sub(1) % STEP) / 2;
+        let rows = Rows::of(drones, first, STEP);
+        let moves = drones.iter().any(|drone| !drone.hovers());
+        if rows.list.len() < FEWEST || !moves && drones.len() < FEWEST_DRONES {
+            return None;
+        }
+        let own_slopes = drones.iter().map(|drone| drone.own_slope_share);
+        Some(Self {
+            drones,
+            first,
+            neighbours: before(drones, &rows, if moves { moving::REACH } else { REACH }),
+            fine: Whole::of(drones, &rows, FINE),
+            coarse: Whole::of(drones, &rows, COARSE),
+            rows,
+            roughly_mps: drones.iter().map(|drone| drone.own_mps().hypot(OWN_MPS)).collect(),
+            slope_share: rms(own_slopes).unwrap_or(0.0),
+            moves,
+        })
+    }
+
+    /// The most probable scales of each family of air, with what they were found by.
+    fn scales(&self, wind_mps: Option<[f64; 2]>) -> Option<(Search<'_>, Vec<Found>)> {
+        let mut search = Search {
+            rows: &self.rows,
+            neighbours: &self.neighbours,
+            whole: Some(&self.fine),
+            coarse: Some(&self.coarse),
+            own_mps: &self.roughly_mps,
+            slope_share: self.slope_share,
+            wind_mps,
+            factor: open_factor(&prior_factor(None, false)),
+        };
+        let mut families = search.all();
+        if let (true, None) = (self.moves, wind_mps) {
+            search.wind_mps = moving::drift(&search, families.first()?);
+            if search.wind_mps.is_some() {
+                families = search.all();
+            }
+        }
+        Some((search, families))
+    }
+}
+
+/// The map of values in air of these scales, and of thermals that the values are without.
+fn mapped(
+    input: &Input<'_>,
+    values: &Values<'_>,
+    search: Search<'_>,
+    families: &[Found],
+    thermals: Vec<Thermal>,
+) -> Option<Posterior> {
     let own_of = |air: &Air| -> Vec<f64> {
         // Air that each drone met alone in its calibration is in its constant.
         let own = input.calibration.own_mps(air);
         input.drones.iter().map(|drone| drone.own_mps().max(own)).collect()
     };
     let components = |air: &Air| input.calibration.components(air);
-    let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> =
-        forms.iter().map(|found| (found, sampled(&search, found, &components, &own_of))).collect();
+    let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> = families
+        .iter()
+        .map(|found| (found, sampled(&search, found, &components, &own_of)))
+        .collect();
     let found = sampled
         .iter()
         .max_by(|a, b| a.1.ln_evidence.total_cmp(&b.1.ln_evidence))
-        .map_or(found, |(found, _)| found);
-    let air = search.air(found.form, &found.best);
+        .map(|(found, _)| *found)?;
+    let air = search.air(found.family, &found.best);
     let own_mps = own_of(&air);
-    let search = Search { own_mps: &own_mps, ..search };
+    let search = Search { own_mps: &own_mps, whole: None, ..search };
     let (length_m, time_s) = (averaged(&sampled, LN_LENGTH), averaged(&sampled, LN_TIME));
-    let search = Search { whole: None, ..search };
-    let system = search.system(found.form, &found.best)?;
+    let system = search.system(found.family, &found.best)?;
     let (mean, covariance, uniform_probability) = over_all(&sampled)?;
-    let (own, answers) = system.own();
-    let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
-    let model =
-        Model { drones: input.drones, covariance: Covariance::new(air).shown(slope_share), linear };
-    let adequacy = adequate(&model, &rows, &all);
-    let mut sites: Vec<(Option<usize>, [f64; 3])> = (0..input.drones.len())
-        .map(|index| (Some(index), input.drones[index].place_at(0).unwrap_or_default()))
-        .collect();
-    sites.extend(input.lost_m.iter().map(|place_m| (None, *place_m)));
-    let mut drones = model.at(&sites, input.seconds);
-    let lost = drones.split_off(input.drones.len());
+    let covariance_of_air = Covariance::new(air).shown(values.slope_share);
+    let model = Model {
+        drones: values.drones,
+        covariance: covariance_of_air,
+        linear: linear(&system, mean, covariance),
+    };
+    let sites = Sites { lost_m: input.lost_m, seconds: input.seconds, first: values.first };
+    let mut predicted = Predicted::of(&model, &values.rows, &sites);
+    if !thermals.is_empty() {
+        let components = components(&air);
+        let (at_best, ..) = mixed(std::iter::once((1.0, &choices(&system, &components)[..])))?;
+        predicted.add(&thermals, &values.rows, input.drones, &sites);
+        // What one standard error of each of a thermal's numbers changes, of which there are as many as directions.
+        let mut others = Vec::new();
+        for aside in asides(&thermals) {
+            let drones = less(input.drones, &aside);
+            let rows = Rows::of(&drones, values.first, STEP);
+            let system = Search { rows: &rows, ..search }.system(found.family, &found.best)?;
+            let choices = choices(&system, &components);
+            let (there, ..) = mixed(std::iter::once((1.0, &choices[..])))?;
+            let linear = linear(&system, mean + there - at_best, covariance);
+            let model = Model { drones: &drones, covariance: covariance_of_air, linear };
+            let mut other = Predicted::of(&model, &rows, &sites);
+            other.add(&aside, &rows, input.drones, &sites);
+            others.push(other);
+        }
+        predicted.widen(&others);
+    }
+    let Predicted { mut drones, lost, grid, fleet_mps } = predicted;
     for (series, drone) in drones.iter_mut().zip(input.drones) {
         series.keep_near(drone);
         series.doubt_slope(drone.slope_share);
     }
-    let zero_shift_mps = shift(&model, &rows);
     Some(Posterior {
-        grid: grid(&model, input.lost_m, first),
-        fleet_mps: model.fleet(&rows),
+        grid,
+        fleet_mps,
         drones,
         lost,
         air,
         length_m,
         time_s,
-        adequacy,
-        zero_shift_mps,
+        adequacy: adequate(&model, &values.rows, &values.neighbours),
+        zero_shift_mps: shift(&model, &values.rows),
         uniform_probability,
         thermals,
     })
 }
 
-/// What the values allow of the scales of one form, with what each choice of them says about everything linear.
+/// Everything linear, with these common errors.
+fn linear(system: &System, mean: CommonVector, covariance: Common) -> Linear {
+    let (own, answers) = system.own();
+    Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() }
+}
+
+/// What the values allow of the scales of one family, with what each choice of them says about everything linear.
 pub(super) fn sampled(
     search: &Search<'_>,
     found: &Found,
     components: &(dyn Fn(&Air) -> Vec<Component> + Sync),
     own_of: &dyn Fn(&Air) -> Vec<f64>,
 ) -> Sampled<Vec<Choice>> {
-    let own_mps = own_of(&search.air(found.form, &found.best));
+    let own_mps = own_of(&search.air(found.family, &found.best));
     let search = Search { own_mps: &own_mps, ..*search };
     samples(found, |point| {
-        let system = search.system(found.form, point)?;
-        let choices = choices(&system, &components(&search.air(found.form, point)));
+        let system = search.system(found.family, point)?;
+        let choices = choices(&system, &components(&search.air(found.family, point)));
         let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
         Some((log_likelihood + log_prior(point), choices))
     })
@@ -269,14 +345,14 @@ fn mixed<'a>(
     (mean.iter().all(|value| value.is_finite())).then_some((mean, covariance, uniform))
 }
 
-/// What all points of all forms say of the common errors: mean, covariance, and the weight of a uniform updraft.
+/// What all points of all families say of the common errors: mean, covariance, and the weight of a uniform updraft.
 pub(super) fn over_all(
     sampled: &[(&Found, Sampled<Vec<Choice>>)],
 ) -> Option<(CommonVector, Common, f64)> {
     mixed(weighed(sampled).map(|(weight, drawn)| (weight, drawn.kept.as_slice())))
 }
 
-/// All points of all forms, which weigh by their evidence; weights add up to one.
+/// All points of all families, which weigh by their evidence; weights add up to one.
 fn weighed<'a>(
     sampled: &'a [(&Found, Sampled<Vec<Choice>>)],
 ) -> impl Iterator<Item = (f64, &'a Drawn<Vec<Choice>>)> {
@@ -287,7 +363,7 @@ fn weighed<'a>(
     })
 }
 
-/// A scale that is searched as a logarithm, over all points and forms: its mean, and 1.96 standard deviations to each side,
+/// A scale that is searched as a logarithm, over all points and families: its mean, and 1.96 standard deviations to each side,
 /// of which one is that of the points on this side.
 fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
     let points: Vec<(f64, f64)> =

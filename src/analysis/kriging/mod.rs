@@ -29,6 +29,7 @@ mod moving;
 mod moving_tests;
 mod neighbours;
 mod predict;
+mod predicted;
 mod sampling;
 mod scales;
 mod thermals;

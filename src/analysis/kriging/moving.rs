@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::neighbours::Reach;
-use super::scales::{DRIFT, Found, Search};
+use super::scales::{DRIFT, Family, Found, Search};
 use crate::numeric::{differences, minimise};
 
 /// What the likelihood of drones that move conditions on.
@@ -21,10 +21,11 @@ const WORTH: f64 = 3.0;
 pub(super) fn drift(search: &Search<'_>, found: &Found) -> Option<[f64; 2]> {
     let mut point = found.best;
     point[DRIFT] = 1.0;
+    let drifts = Family { drifts: true, ..found.family };
     let gain = |drift_mps: &[f64; 2]| {
         let [u, v] = drift_mps.map(|part| part / DRIFT_MPS);
         let search = Search { wind_mps: Some(*drift_mps), ..*search };
-        search.log_posterior(found.form, &point) - 0.5 * (u * u + v * v)
+        search.log_posterior(drifts, &point) - 0.5 * (u * u + v * v)
     };
     let tried: Vec<[f64; 2]> =
         TRIED_MPS.iter().flat_map(|u| TRIED_MPS.iter().map(|v| [*u, *v])).collect();

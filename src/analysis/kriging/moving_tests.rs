@@ -154,12 +154,12 @@ fn mapped(drones: &[Drone]) -> Vec<Series> {
     let sampled: Vec<_> =
         forms.iter().map(|found| (found, sampled(&search, found, &zero, &own_of))).collect();
     let (mean, covariance, _) = over_all(&sampled).unwrap();
-    let air = search.air(forms[0].form, &forms[0].best);
+    let air = search.air(forms[0].family, &forms[0].best);
     if std::env::var("UPDRAFT_EACH").is_ok() {
         println!("{air:?}");
     }
     let search = Search { whole: None, ..search };
-    let system = search.system(forms[0].form, &forms[0].best).unwrap();
+    let system = search.system(forms[0].family, &forms[0].best).unwrap();
     let (own, answers) = system.own();
     let linear = Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() };
     let model = Model { drones, covariance: Covariance::new(air), linear };

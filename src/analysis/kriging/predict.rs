@@ -249,6 +249,36 @@ impl Series {
         }
     }
 
+    /// Adds to the value of each second, m/s.
+    pub(super) fn add(&mut self, by_mps: impl Fn(usize) -> f64) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (second, value) in self.mean_mps.iter_mut().enumerate() {
+            let Some(value) = value else { continue };
+            let more = by_mps(second);
+            *value += more;
+            sum += more;
+            count += 1.0;
+        }
+        if let (Some((value, _)), true) = (&mut self.over_all, count > 0.0) {
+            *value += sum / count;
+        }
+    }
+
+    /// Widens standard deviations by how far others are off.
+    pub(super) fn widen<'a>(&mut self, others: impl Iterator<Item = &'a Self>) {
+        for other in others {
+            let own = self.mean_mps.iter().zip(&mut self.sd_mps).zip(&other.mean_mps);
+            for ((value, sd), there) in own {
+                if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
+                    *sd = sd.hypot(there - value);
+                }
+            }
+            if let (Some((value, sd)), Some((there, _))) = (&mut self.over_all, other.over_all) {
+                *sd = sd.hypot(there - *value);
+            }
+        }
+    }
+
     /// Drops what lies before the first and behind the last value of a drone.
     pub(super) fn keep_near(&mut self, drone: &Drone) {
         let has = |value: &Option<super::data::Value>| value.is_some();

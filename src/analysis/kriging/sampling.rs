@@ -112,10 +112,10 @@ impl Proposal<'_> {
     }
 }
 
-/// Points that stand for the posterior of one form.
+/// Points that stand for the posterior of one family.
 pub(super) struct Sampled<T> {
     pub(super) drawn: Vec<Drawn<T>>,
-    /// Logarithm of the integral of what points are weighed by, but for a constant that is the same for all forms.
+    /// Logarithm of the integral of what points are weighed by, but for a constant that is the same for all families.
     pub(super) ln_evidence: f64,
 }
 
@@ -236,13 +236,16 @@ fn quantile(share: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::analysis::kriging::covariance::Form;
+    use crate::analysis::kriging::scales::Family;
+
+    const FAMILY: Family = Family { form: Form::Exponential, drifts: false };
 
     /// A guess that is off, and a posterior with a long ridge.
     #[test]
     fn points_find_a_ridge_that_the_first_guess_does_not_see() {
         let mut point = [0.0; SCALES];
         point[0] = 0.3;
-        let found = Found::guess(Form::Exponential, point, &(SMatrix::identity() * 0.09));
+        let found = Found::guess(FAMILY, point, &(SMatrix::identity() * 0.09));
         // The first two scales lie on a line, with a standard deviation of 1.0 along and 0.25 across it.
         let ln_posterior = |point: &Point| {
             let (along, across) =
@@ -263,7 +266,7 @@ mod tests {
 
     #[test]
     fn rounds_go_on_until_enough_points_count_and_none_counts_for_too_much() {
-        let found = Found::guess(Form::Exponential, [0.0; SCALES], &SMatrix::identity());
+        let found = Found::guess(FAMILY, [0.0; SCALES], &SMatrix::identity());
         let drawn = |sd: f64| {
             let ln_posterior =
                 |point: &Point| -0.5 * SVector::from(*point).norm_squared() / (sd * sd);

@@ -19,7 +19,7 @@ pub(super) const LN_LENGTH: usize = 1;
 const STRETCH_ALONG: usize = 2;
 const STRETCH_DIAGONAL: usize = 3;
 pub(super) const LN_TIME: usize = 4;
-/// Drift as a share of the wind.
+/// Drift as a share of the wind, of a family that drifts.
 pub(super) const DRIFT: usize = 5;
 pub(super) const LN_GUST: usize = 6;
 const LN_GUST_TIME: usize = 7;
@@ -33,8 +33,8 @@ pub(super) type Point = [f64; SCALES];
 
 /// What is known before the values are seen: mean and standard deviation of each scale. A field day has 0.5 m/s,
 /// 145 m and 186 s (docs/physics.md, 4.1); the priors reach from a tenth to ten times that and more, and only
-/// matter where the values say nothing. Rolls of the boundary layer are three times as long as wide and more. A field drifts with
-/// the wind, or does not.
+/// matter where the values say nothing. Rolls of the boundary layer are three times as long as wide and more. A field that drifts
+/// goes with the wind, roughly.
 pub(super) const PRIOR: [(f64, f64); SCALES] = [
     (-1.2, 1.5),
     (4.7, 1.0),
@@ -56,6 +56,13 @@ const FARTHEST: f64 = 4.0;
 const STEP: f64 = 0.05;
 /// Step of the first differences. Numerical.
 const SLOPE_STEP: f64 = 1e-4;
+
+/// Wind below which no drift is looked for, m/s: leans do not know it better.
+const CALM_MPS: f64 = 0.2;
+/// Length of gusts that a search begins with, m: their scale is about their height above the ground.
+const GUSTS_M: f64 = 30.0;
+/// Slow air that it begins with besides, m/s.
+const SLOW_MPS: f64 = 0.5;
 
 /// A form that is less probable than another by so much does not count, nats. One in 150.
 const NATS: f64 = 5.0;
@@ -132,10 +139,36 @@ pub(super) struct Search<'a> {
     pub(super) factor: Common,
 }
 
+/// What a likelihood takes the field for: airs between which no scale leads over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Family {
+    pub(super) form: Form,
+    /// Whether the field goes with the wind; if not, it stays where it is.
+    pub(super) drifts: bool,
+}
+
+impl Family {
+    /// All of them, where there is a wind or none is known.
+    fn all(in_wind: bool) -> Vec<Self> {
+        let drifts: &[bool] = if in_wind { &[false, true] } else { &[false] };
+        let of = |form| drifts.iter().map(move |drifts| Self { form, drifts: *drifts });
+        Form::ALL.into_iter().flat_map(of).collect()
+    }
+
+    /// Where the search for its scales begins: those of a field day, and of gusts that drift over slow air.
+    fn starts(self) -> Vec<Point> {
+        let start = PRIOR.map(|(mean, _)| mean);
+        let mut gusts = start;
+        gusts[LN_LENGTH] = GUSTS_M.ln();
+        gusts[LN_SLOW] = SLOW_MPS.ln();
+        if self.drifts { vec![start, gusts] } else { vec![start] }
+    }
+}
+
 /// The most probable scales and their uncertainty.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
-    pub(super) form: Form,
+    pub(super) family: Family,
     pub(super) best: Point,
     /// Covariance of the scales.
     pub(super) covariance: SMatrix<f64, SCALES, SCALES>,
@@ -156,7 +189,7 @@ pub(super) struct Axis {
 impl Found {
     /// A normal distribution around a point.
     pub(super) fn guess(
-        form: Form,
+        family: Family,
         best: Point,
         covariance: &SMatrix<f64, SCALES, SCALES>,
     ) -> Self {
@@ -165,7 +198,7 @@ impl Found {
             along[axis] = covariance[(axis, axis)].sqrt();
             Axis { along, reach: [1.0; 2] }
         });
-        Self { form, best, covariance: *covariance, axes: axes.collect() }
+        Self { family, best, covariance: *covariance, axes: axes.collect() }
     }
 }
 
@@ -179,7 +212,7 @@ pub(super) fn open_factor(factor: &Common) -> Common {
 /// Where a search for the scales of one form ended.
 #[derive(Clone, Copy, Debug)]
 struct Top {
-    form: Form,
+    family: Family,
     best: Point,
     /// Logarithm of the posterior there.
     value: f64,
@@ -188,30 +221,30 @@ struct Top {
 }
 
 impl Top {
-    fn of<T>(form: Form, Least { at, value, inverse, .. }: Least<SCALES, T>) -> Self {
-        Self { form, best: at, value: -value, inverse }
+    fn of<T>(family: Family, Least { at, value, inverse, .. }: Least<SCALES, T>) -> Self {
+        Self { family, best: at, value: -value, inverse }
     }
 }
 
 impl Search<'_> {
     /// The air of a point.
-    pub(super) fn air(&self, form: Form, point: &Point) -> Air {
-        air_of(form, point, self.wind_mps)
+    pub(super) fn air(&self, family: Family, point: &Point) -> Air {
+        air_of(family, point, self.wind_mps)
     }
 
-    pub(super) fn log_posterior(&self, form: Form, point: &Point) -> f64 {
-        let Some(system) = self.system(form, point) else { return f64::NEG_INFINITY };
+    pub(super) fn log_posterior(&self, family: Family, point: &Point) -> f64 {
+        let Some(system) = self.system(family, point) else { return f64::NEG_INFINITY };
         let likelihood = system
             .posterior(&CommonVector::zeros(), &self.factor)
             .map_or(f64::NEG_INFINITY, |posterior| posterior.log_likelihood);
         likelihood + log_prior(point)
     }
 
-    pub(super) fn system(&self, form: Form, point: &Point) -> Option<System> {
+    pub(super) fn system(&self, family: Family, point: &Point) -> Option<System> {
         if outside(point) > 0.0 {
             return None;
         }
-        self.system_in(&Covariance::new(self.air(form, point)).shown(self.slope_share))
+        self.system_in(&Covariance::new(self.air(family, point)).shown(self.slope_share))
     }
 
     /// The likelihood in the air of a covariance.
@@ -223,25 +256,25 @@ impl Search<'_> {
     }
 
     /// Slopes of the loss, each by a thread of its own.
-    fn slopes(&self, form: Form, at: &Point, value: f64) -> Point {
+    fn slopes(&self, family: Family, at: &Point, value: f64) -> Point {
         let slopes: Vec<f64> = (0..SCALES)
             .into_par_iter()
             .map(|index| {
                 let mut beside = *at;
                 beside[index] += SLOPE_STEP;
-                (-self.log_posterior(form, &beside) - value) / SLOPE_STEP
+                (-self.log_posterior(family, &beside) - value) / SLOPE_STEP
             })
             .collect();
         std::array::from_fn(|index| if slopes[index].is_finite() { slopes[index] } else { 0.0 })
     }
 
     /// The most probable scales from a start, by some of the values where that is enough to begin with.
-    fn climb(&self, form: Form, start: Point) -> Top {
+    fn climb(&self, family: Family, start: Point) -> Top {
         let some = Search { whole: self.coarse.or(self.whole), ..*self };
-        let loss = |point: &Point| -some.log_posterior(form, point);
+        let loss = |point: &Point| -some.log_posterior(family, point);
         let slopes = |at: &Point, value| differences(loss, at, value);
         let enough = if self.coarse.is_some() { COARSE_ENOUGH } else { ENOUGH };
-        Top::of(form, minimise_roughly(start, None, enough, loss, slopes))
+        Top::of(family, minimise_roughly(start, None, enough, loss, slopes))
     }
 
     /// The most probable scales, over forms and starts.
@@ -250,58 +283,51 @@ impl Search<'_> {
         self.all().into_iter().next()
     }
 
-    /// The most probable scales of each form that is not much less probable than another, the most probable first.
+    /// The most probable scales of each family that is not much less probable than another, the most probable first.
     pub(super) fn all(&self) -> Vec<Found> {
-        let start = PRIOR.map(|(mean, _)| mean);
-        let starts: Vec<(Form, f64)> = Form::ALL
-            .into_iter()
-            .flat_map(|form| {
-                let drifts: &[f64] = if self.wind_mps.is_some() { &[0.0, 1.0] } else { &[0.5] };
-                drifts.iter().map(move |drift| (form, *drift))
-            })
+        let drifts = self.wind_mps.is_some_and(|[u, v]| u.hypot(v) > CALM_MPS);
+        let families = Family::all(drifts);
+        let starts: Vec<(Family, Point)> = families
+            .iter()
+            .flat_map(|family| family.starts().into_iter().map(move |start| (*family, start)))
             .collect();
-        let climbed: Vec<Top> = starts
-            .par_iter()
-            .map(|(form, drift)| {
-                let mut start = start;
-                start[DRIFT] = *drift;
-                self.climb(*form, start)
-            })
-            .collect();
-        let mut tops: Vec<Top> = Form::ALL
+        let climbed: Vec<Top> =
+            starts.par_iter().map(|(family, start)| self.climb(*family, *start)).collect();
+        let mut tops: Vec<Top> = families
             .into_iter()
-            .filter_map(|form| {
-                let own = climbed.iter().filter(|top| top.form == form && top.value.is_finite());
+            .filter_map(|family| {
+                let own =
+                    climbed.iter().filter(|top| top.family == family && top.value.is_finite());
                 own.max_by(|a, b| a.value.total_cmp(&b.value)).copied()
             })
             .collect();
         keep_probable(&mut tops, if self.coarse.is_some() { COARSE_NATS } else { NATS });
         if self.coarse.is_some() {
             for top in &mut tops {
-                let loss = |point: &Point| -self.log_posterior(top.form, point);
-                let slopes = |at: &Point, value| self.slopes(top.form, at, value);
+                let loss = |point: &Point| -self.log_posterior(top.family, point);
+                let slopes = |at: &Point, value| self.slopes(top.family, at, value);
                 let found = minimise_roughly(top.best, Some(&top.inverse), ENOUGH, loss, slopes);
-                *top = Top::of(top.form, found);
+                *top = Top::of(top.family, found);
             }
             keep_probable(&mut tops, NATS);
         }
         tops.into_iter()
-            .map(|Top { form, best, value: log_posterior, .. }| {
-                let covariance = self.curvature(form, &best, log_posterior);
-                let axes = self.axes(form, &best, log_posterior, &covariance);
-                Found { form, best, covariance, axes }
+            .map(|Top { family, best, value: log_posterior, .. }| {
+                let covariance = self.curvature(family, &best, log_posterior);
+                let axes = self.axes(family, &best, log_posterior, &covariance);
+                Found { family, best, covariance, axes }
             })
             .collect()
     }
 
     /// Inverse of the curvature of the posterior at its top.
-    fn curvature(&self, form: Form, best: &Point, top: f64) -> SMatrix<f64, SCALES, SCALES> {
+    fn curvature(&self, family: Family, best: &Point, top: f64) -> SMatrix<f64, SCALES, SCALES> {
         let value = |shifts: &[(usize, f64)]| {
             let mut point = *best;
             for (index, shift) in shifts {
                 point[*index] += shift * STEP;
             }
-            self.log_posterior(form, &point)
+            self.log_posterior(family, &point)
         };
         let ahead: Vec<f64> =
             (0..SCALES).into_par_iter().map(|axis| value(&[(axis, 1.0)])).collect();
@@ -341,7 +367,7 @@ impl Search<'_> {
     /// 2009, section 6.5): where it has fallen by as much as a normal one would at the square root of two.
     fn axes(
         &self,
-        form: Form,
+        family: Family,
         best: &Point,
         top: f64,
         covariance: &SMatrix<f64, SCALES, SCALES>,
@@ -357,7 +383,7 @@ impl Search<'_> {
                 let mut point = *best;
                 let by = sign * std::f64::consts::SQRT_2;
                 point.iter_mut().zip(along.iter()).for_each(|(own, along)| *own += by * along);
-                let fallen = top - self.log_posterior(form, &point);
+                let fallen = top - self.log_posterior(family, &point);
                 if fallen.is_finite() { (1.0 / fallen.max(1e-3)).sqrt() } else { LEAST_REACH }
             })
             .map(|reach: f64| reach.clamp(LEAST_REACH, MOST_REACH))
@@ -374,14 +400,15 @@ impl Search<'_> {
 }
 
 /// The air of a point.
-pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> Air {
+pub(super) fn air_of(family: Family, point: &Point, wind_mps: Option<[f64; 2]>) -> Air {
+    let goes_mps = wind_mps.filter(|_| family.drifts);
     Air {
-        form,
+        form: family.form,
         sd_mps: point[LN_SD].exp(),
         length_m: point[LN_LENGTH].exp(),
         stretch: [point[STRETCH_ALONG], point[STRETCH_DIAGONAL]],
         time_s: point[LN_TIME].exp(),
-        drift_mps: wind_mps.map_or([0.0; 2], |wind| wind.map(|part| point[DRIFT] * part)),
+        drift_mps: goes_mps.map_or([0.0; 2], |wind| wind.map(|part| point[DRIFT] * part)),
         gust_mps: point[LN_GUST].exp(),
         gust_s: point[LN_GUST_TIME].exp(),
         slow_mps: point[LN_SLOW].exp(),
@@ -389,7 +416,7 @@ pub(super) fn air_of(form: Form, point: &Point, wind_mps: Option<[f64; 2]>) -> A
     }
 }
 
-/// Drops forms that are much less probable than another, and puts the most probable first.
+/// Drops families that are much less probable than another, and puts the most probable first.
 fn keep_probable(tops: &mut Vec<Top>, nats: f64) {
     tops.retain(|top| top.value.is_finite());
     tops.sort_by(|a, b| b.value.total_cmp(&a.value));

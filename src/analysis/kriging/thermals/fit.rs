@@ -310,6 +310,22 @@ impl Candidate {
         self
     }
 
+    /// The same thermal off by one standard error in each independent direction.
+    pub(super) fn asides(&self) -> Vec<Self> {
+        let eigen = self.covariance.symmetric_eigen();
+        let sds = eigen.eigenvalues.iter().map(|value| value.max(0.0).sqrt());
+        let aside = |(sd, way): (f64, SVector<f64, UNKNOWNS>)| {
+            let mut aside = self.clone();
+            aside.numbers.iter_mut().zip(way.iter()).for_each(|(number, by)| *number += sd * by);
+            aside.peak_mps += sd * way[PEAK];
+            aside
+        };
+        sds.zip(eigen.eigenvectors.column_iter().map(|column| column.into_owned()))
+            .filter(|(sd, _)| *sd > 0.0)
+            .map(aside)
+            .collect()
+    }
+
     /// Something that follows from the numbers and the peak, with its standard error.
     pub(super) fn derived(&self, of: impl Fn(&Numbers, f64) -> f64) -> (f64, f64) {
         let value = of(&self.numbers, self.peak_mps);

@@ -21,7 +21,7 @@ use super::covariance::{Covariance, Form};
 use super::data::{Drone, Row, Rows, UNIFORM};
 use super::neighbours::{Neighbours, Reach, before};
 use super::scales::{
-    COARSE, Extent, FINE, Found, LN_GUST, LN_LENGTH, LN_SD, LN_TIME, Point, Search, Whole,
+    COARSE, Extent, FINE, Family, Found, LN_GUST, LN_LENGTH, LN_SD, LN_TIME, Point, Search, Whole,
     log_prior,
 };
 use crate::numeric::{differences, minimise};
@@ -82,6 +82,47 @@ pub(in super::super) struct Thermal {
     pub(in super::super) sink: Known,
     /// Logarithm of the evidence for it over that for none.
     pub(in super::super) log_odds: f64,
+    candidate: Candidate,
+}
+
+/// The updraft that thermals add for who moves like this, mean over the 10 s around a time, m/s.
+pub(super) fn updraft_mps(
+    thermals: &[Thermal],
+    place_m: [f64; 3],
+    time_s: f64,
+    velocity_mps: [f64; 3],
+) -> f64 {
+    let one = |Thermal { candidate, .. }: &Thermal| {
+        let shape = Shape::new(&candidate.numbers, candidate.at_s);
+        candidate.peak_mps * shape.mean(place_m, time_s, velocity_mps)
+    };
+    thermals.iter().map(one).sum()
+}
+
+/// Drones with the values that they would have without thermals.
+pub(super) fn less(drones: &[Drone], thermals: &[Thermal]) -> Vec<Drone> {
+    let mut left = drones.to_vec();
+    for (drone, own) in left.iter_mut().zip(drones) {
+        for (second, value) in drone.values.iter_mut().enumerate() {
+            let (Some(value), Some(place_m)) = (value, own.place_at(second)) else { continue };
+            let velocity_mps = own.velocity_at(second);
+            value.updraft_mps -= updraft_mps(thermals, place_m, second as f64, velocity_mps);
+        }
+    }
+    left
+}
+
+/// The same thermals with one of them off by one standard error, in each independent direction of each.
+pub(super) fn asides(thermals: &[Thermal]) -> Vec<Vec<Thermal>> {
+    let mut found = Vec::new();
+    for (index, thermal) in thermals.iter().enumerate() {
+        for candidate in thermal.candidate.asides() {
+            let mut aside = thermals.to_vec();
+            aside[index].candidate = candidate;
+            found.push(aside);
+        }
+    }
+    found
 }
 
 /// A record in which thermals are looked for.
@@ -94,7 +135,7 @@ pub(super) struct Record<'a> {
 }
 
 /// Scales of the air.
-type Scales = (Form, Point);
+type Scales = (Family, Point);
 
 /// A thermal with the scales of the air around it.
 struct Explained {
@@ -122,7 +163,7 @@ impl Record<'_> {
             before(self.drones, rows, reach)
         };
         let looked = Looked { search: &search, drones: self.drones, neighbours: &neighbours };
-        looked.thermals(&region, (self.found.form, self.found.best))
+        looked.thermals(&region, (self.found.family, self.found.best))
     }
 }
 
@@ -160,17 +201,20 @@ impl Looked<'_> {
     }
 
     /// The most probable scales of a record in any form, from those of another one.
-    fn in_any_form(&self, rows: &Rows, (form, start): Scales) -> Scales {
-        let mut others: Vec<Form> = Form::ALL.into_iter().filter(|other| *other != form).collect();
-        others.insert(0, form);
-        let roughly: Vec<(Scales, f64)> =
-            others.into_par_iter().map(|form| self.again(rows, (form, start), COARSE)).collect();
+    fn in_any_form(&self, rows: &Rows, (family, start): Scales) -> Scales {
+        let mut forms: Vec<Form> =
+            Form::ALL.into_iter().filter(|other| *other != family.form).collect();
+        forms.insert(0, family.form);
+        let roughly: Vec<(Scales, f64)> = forms
+            .into_par_iter()
+            .map(|form| self.again(rows, (Family { form, ..family }, start), COARSE))
+            .collect();
         let best = roughly.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
-        self.again(rows, best.map_or((form, start), |(scales, _)| scales), FINE).0
+        self.again(rows, best.map_or((family, start), |(scales, _)| scales), FINE).0
     }
 
     /// The most probable scales of a record, from others, with the logarithm of their posterior.
-    fn again(&self, rows: &Rows, (form, start): Scales, extent: Extent) -> (Scales, f64) {
+    fn again(&self, rows: &Rows, (family, start): Scales, extent: Extent) -> (Scales, f64) {
         let whole = Whole::of(self.drones, rows, extent);
         let search = Search { rows, whole: Some(&whole), ..*self.search };
         let of = |some: &[f64; 4]| {
@@ -178,15 +222,15 @@ impl Looked<'_> {
             AGAIN.iter().zip(some).for_each(|(index, value)| point[*index] = *value);
             point
         };
-        let loss = |some: &[f64; 4]| -search.log_posterior(form, &of(some));
+        let loss = |some: &[f64; 4]| -search.log_posterior(family, &of(some));
         let first = AGAIN.map(|index| start[index]);
         let (best, least) = minimise(first, loss, |at, value| differences(loss, at, value));
-        ((form, if least.is_finite() { of(&best) } else { start }), -least)
+        ((family, if least.is_finite() { of(&best) } else { start }), -least)
     }
 
-    fn whitening(&self, rows: &Rows, (form, point): &Scales) -> Option<Whitening<'_>> {
+    fn whitening(&self, rows: &Rows, (family, point): &Scales) -> Option<Whitening<'_>> {
         let covariance =
-            Covariance::new(self.search.air(*form, point)).shown(self.search.slope_share);
+            Covariance::new(self.search.air(*family, point)).shown(self.search.slope_share);
         let Search { factor, own_mps, .. } = self.search;
         Whitening::new(rows, self.neighbours, &covariance, factor, own_mps)
     }
@@ -314,5 +358,6 @@ fn thermal(candidate: &Candidate, log_odds: f64) -> Thermal {
             .derived(|numbers, peak_mps| peak_mps * Shape::new(numbers, at_s).core_flux_m3ps()),
         sink: candidate.derived(|numbers, _| numbers[SINK]),
         log_odds,
+        candidate: candidate.clone(),
     }
 }
