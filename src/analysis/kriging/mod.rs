@@ -32,6 +32,8 @@ mod predict;
 mod predicted;
 mod sampling;
 mod scales;
+#[cfg(test)]
+mod scales_tests;
 mod thermals;
 #[cfg(test)]
 mod thousands_tests;

@@ -112,14 +112,13 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
     said.extend(map.thermals.first().map(|thermal| {
         let n = map.thermals.len();
         let them = if n == 1 { "A thermal was".to_owned() } else { format!("{n} thermals were") };
-        let peak = thermal.peak_mps;
         let which = if n == 1 { "" } else { ", the most certain one" };
         format!(
-            "{them} found{which}{} at {}: {} m/s more in the core than around it, {} m in radius (standard errors).",
+            "{them} found{which}{} at {}: {} m/s more in the core than around it, {} m in radius (95 %).",
             of_core(flight, thermal),
             moment(when(flight), thermal.time_s),
-            estimate(peak),
-            estimate(thermal.radius_m),
+            estimate(Thermal::interval(&thermal.peak_mps)),
+            estimate(Thermal::interval(&thermal.radius_m)),
         )
     }));
     said.push(wind_sentence(flight.statistics.as_ref().and_then(|found| found.wind.as_ref())));

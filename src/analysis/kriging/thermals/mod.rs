@@ -13,7 +13,7 @@ mod shape;
 mod whiten;
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use rayon::prelude::*;
 

@@ -10,7 +10,7 @@ use crate::analysis::kriging::covariance::{Air, Covariance, Form};
 use crate::analysis::kriging::data::{Drone, Rows, UNIFORM, Value};
 use crate::analysis::kriging::moving;
 use crate::analysis::kriging::neighbours::{Reach, before};
-use crate::analysis::kriging::scales::{COARSE, FINE, Search, Whole};
+use crate::analysis::kriging::scales::{COARSE, FINE, Found, Search, Whole};
 use crate::analysis::kriging::vecchia::Common;
 use crate::analysis::shape::PARAMETERS;
 use crate::base::rng::{Purpose, stream};
@@ -67,7 +67,7 @@ impl Truth {
 
 /// A fleet of 5 x 5 that hovers 10 m apart, or flies legs of 160 m at 4 m/s there and back.
 #[derive(Clone, Copy, Debug)]
-enum Fleet {
+pub(in crate::analysis::kriging) enum Fleet {
     Hover { seconds: usize },
     Scan { legs: usize },
 }
@@ -118,7 +118,12 @@ impl Fleet {
     }
 }
 
-fn air(form: Form, sd_mps: f64, length_m: f64, time_s: f64) -> Air {
+pub(in crate::analysis::kriging) fn air(
+    form: Form,
+    sd_mps: f64,
+    length_m: f64,
+    time_s: f64,
+) -> Air {
     Air {
         form,
         sd_mps,
@@ -148,7 +153,12 @@ fn drones(fleet: Fleet) -> Vec<Drone> {
 }
 
 /// A record in an air, with or without a thermal.
-fn made(seed: u64, fleet: Fleet, air: Air, truth: Option<Truth>) -> (Vec<Drone>, Rows) {
+pub(in crate::analysis::kriging) fn made(
+    seed: u64,
+    fleet: Fleet,
+    air: Air,
+    truth: Option<Truth>,
+) -> (Vec<Drone>, Rows) {
     let drones = drones(fleet);
     let mut rows = Rows::of(&drones, 5, 10);
     let mut rng = stream(seed, 1, Purpose::Sensors);
@@ -178,7 +188,28 @@ fn made(seed: u64, fleet: Fleet, air: Air, truth: Option<Truth>) -> (Vec<Drone>,
     (drones, rows)
 }
 
+/// The most probable scales of each family, in this wind.
+pub(in crate::analysis::kriging) fn scales_of(
+    drones: &[Drone],
+    rows: &Rows,
+    wind_mps: Option<[f64; 2]>,
+) -> Vec<Found> {
+    with_search(drones, rows, wind_mps, Search::all)
+}
+
 fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<Thermal> {
+    with_search(drones, rows, wind_mps, |search| {
+        let found = search.best().unwrap();
+        Record { search, drones, found: &found, wind_mps }.thermals()
+    })
+}
+
+fn with_search<T>(
+    drones: &[Drone],
+    rows: &Rows,
+    wind_mps: Option<[f64; 2]>,
+    of: impl FnOnce(&Search<'_>) -> T,
+) -> T {
     let moves = drones.iter().any(|drone| !drone.hovers());
     let reach = if moves { moving::REACH } else { Reach { beside: 7, step: 7, own: 2 } };
     let all = before(drones, rows, reach);
@@ -186,7 +217,7 @@ fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<
     let own_mps = vec![OWN_MPS; drones.len()];
     let mut factor = Common::zeros();
     factor[(UNIFORM, UNIFORM)] = 3.0;
-    let search = Search {
+    of(&Search {
         rows,
         neighbours: &all,
         whole: Some(&fine),
@@ -195,9 +226,7 @@ fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<
         slope_share: 0.0,
         wind_mps,
         factor,
-    };
-    let found = search.best().unwrap();
-    Record { search: &search, drones, found: &found, wind_mps }.thermals()
+    })
 }
 
 /// Draws evenly spread numbers from a seed.
