@@ -101,13 +101,13 @@ pub(in super::super) fn posterior(input: &Input<'_>) -> Option<Posterior> {
     let record = Record { search: &search, drones: input.drones, found, wind_mps: input.wind_mps };
     let thermals = record.thermals();
     if thermals.is_empty() {
-        return mapped(input, &values, search, &families, thermals);
+        return mapped(input, &values, &search, &families, thermals);
     }
     // A thermal is no part of a stationary field: what is left without it is.
     let rest = less(input.drones, &thermals);
     let values = Values::of(input, &rest)?;
     let (search, families) = values.scales(input.wind_mps)?;
-    mapped(input, &values, search, &families, thermals)
+    mapped(input, &values, &search, &families, thermals)
 }
 
 /// Values with what their likelihood needs.
@@ -174,7 +174,7 @@ impl<'a> Values<'a> {
 fn mapped(
     input: &Input<'_>,
     values: &Values<'_>,
-    search: Search<'_>,
+    search: &Search<'_>,
     families: &[Found],
     thermals: Vec<Thermal>,
 ) -> Option<Posterior> {
@@ -186,7 +186,7 @@ fn mapped(
     let components = |air: &Air| input.calibration.components(air);
     let sampled: Vec<(&Found, Sampled<Vec<Choice>>)> = families
         .iter()
-        .map(|found| (found, sampled(&search, found, &components, &own_of)))
+        .map(|found| (found, sampled(search, found, &components, &own_of)))
         .collect();
     let found = sampled
         .iter()
@@ -194,7 +194,7 @@ fn mapped(
         .map(|(found, _)| *found)?;
     let air = search.air(found.family, &found.best);
     let own_mps = own_of(&air);
-    let search = Search { own_mps: &own_mps, whole: None, ..search };
+    let search = Search { own_mps: &own_mps, whole: None, ..*search };
     let (length_m, time_s) = (averaged(&sampled, LN_LENGTH), averaged(&sampled, LN_TIME));
     let system = search.system(found.family, &found.best)?;
     let (mean, covariance, uniform_probability) = over_all(&sampled)?;
@@ -202,7 +202,7 @@ fn mapped(
     let model = Model {
         drones: values.drones,
         covariance: covariance_of_air,
-        linear: linear(&system, mean, covariance),
+        linear: linear(&system, mean, &covariance),
     };
     let sites = Sites { lost_m: input.lost_m, seconds: input.seconds, first: values.first };
     let mut predicted = Predicted::of(&model, &values.rows, &sites);
@@ -218,7 +218,7 @@ fn mapped(
             let system = Search { rows: &rows, ..search }.system(found.family, &found.best)?;
             let choices = choices(&system, &components);
             let (there, ..) = mixed(std::iter::once((1.0, &choices[..])))?;
-            let linear = linear(&system, mean + there - at_best, covariance);
+            let linear = linear(&system, mean + there - at_best, &covariance);
             let model = Model { drones: &drones, covariance: covariance_of_air, linear };
             let mut other = Predicted::of(&model, &rows, &sites);
             other.add(&aside, &rows, input.drones, &sites);
@@ -247,9 +247,9 @@ fn mapped(
 }
 
 /// Everything linear, with these common errors.
-fn linear(system: &System, mean: CommonVector, covariance: Common) -> Linear {
+fn linear(system: &System, mean: CommonVector, covariance: &Common) -> Linear {
     let (own, answers) = system.own();
-    Linear { mean, covariance, own, answers, own_covariance: system.own_covariance() }
+    Linear { mean, covariance: *covariance, own, answers, own_covariance: system.own_covariance() }
 }
 
 /// What the values allow of the scales of one family, with what each choice of them says about everything linear.

@@ -18,7 +18,7 @@ fn gusts_that_the_wind_carries_over_air_that_stays_are_both_found() {
     let mut slow = Vec::new();
     for seed in 0..6 {
         let (drones, rows) = made(seed, HOVER, truth, None);
-        let found = &scales_of(&drones, &rows, Some(WIND_MPS))[0];
+        let found = scales_of(&drones, &rows, Some(WIND_MPS));
         let found = air_of(found.family, &found.best, Some(WIND_MPS));
         println!("{found:?}");
         assert!(found.drift_mps[0] > 1.0, "{found:?}");
@@ -34,7 +34,7 @@ fn a_field_that_stays_in_a_wind_is_not_said_to_drift() {
     let truth = air(Form::Exponential, 0.5, 60.0, 100.0);
     for seed in 0..4 {
         let (drones, rows) = made(seed, HOVER, truth, None);
-        let found = &scales_of(&drones, &rows, Some(WIND_MPS))[0];
+        let found = scales_of(&drones, &rows, Some(WIND_MPS));
         assert!(!found.family.drifts, "{found:?}");
         assert!((25.0..150.0).contains(&found.best[1].exp()), "{found:?}");
     }

@@ -320,7 +320,7 @@ impl Candidate {
             aside.peak_mps += sd * way[PEAK];
             aside
         };
-        sds.zip(eigen.eigenvectors.column_iter().map(|column| column.into_owned()))
+        sds.zip(eigen.eigenvectors.column_iter().map(nalgebra::Matrix::into_owned))
             .filter(|(sd, _)| *sd > 0.0)
             .map(aside)
             .collect()

@@ -28,7 +28,7 @@ enum Profile {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Truth {
+pub(in crate::analysis::kriging) struct Truth {
     profile: Profile,
     /// At 0 s.
     core_m: [f64; 2],
@@ -188,13 +188,13 @@ pub(in crate::analysis::kriging) fn made(
     (drones, rows)
 }
 
-/// The most probable scales of each family, in this wind.
+/// The most probable scales in this wind.
 pub(in crate::analysis::kriging) fn scales_of(
     drones: &[Drone],
     rows: &Rows,
     wind_mps: Option<[f64; 2]>,
-) -> Vec<Found> {
-    with_search(drones, rows, wind_mps, Search::all)
+) -> Found {
+    with_search(drones, rows, wind_mps, |search| search.best().unwrap())
 }
 
 fn looked_for(drones: &[Drone], rows: &Rows, wind_mps: Option<[f64; 2]>) -> Vec<Thermal> {
