@@ -189,13 +189,13 @@ fn row(folder: &Path, settings: &Settings) -> Result<Seen, Box<dyn Error>> {
     let row = Row {
         zero: truth.zero_rms_mps,
         plain: plain.rms_mps,
-        plain_inside: plain.inside_share,
+        plain_inside: plain.inside_share.unwrap_or(f64::NAN),
         rms: truth.rms_mps,
         bias: truth.bias_mps,
         rest: truth.rms_without_bias_mps,
-        inside: truth.inside_share,
+        inside: truth.inside_share.unwrap_or(f64::NAN),
         width,
-        means_inside: truth.means_inside_share,
+        means_inside: truth.means_inside_share.unwrap_or(f64::NAN),
         filled_rms: (filled.iter().map(|(error, _)| error * error).sum::<f64>()
             / filled.len() as f64)
             .sqrt(),

@@ -170,10 +170,12 @@ pub struct TruthCheck {
     pub bias_mps: f64,
     /// Root mean square without that mean, m/s: what is left when the common zero is known.
     pub rms_without_bias_mps: f64,
-    /// Share of the true values inside of their 95 % intervals.
-    pub inside_share: f64,
-    /// Share of the drones whose true mean is inside of the interval of their mean.
-    pub means_inside_share: f64,
+    /// Share of the true values inside of their 95 % intervals; absent: they have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside_share: Option<f64>,
+    /// Share of the drones whose true mean is inside of the interval of their mean; absent likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub means_inside_share: Option<f64>,
     /// Root mean square error of the best linear estimate with the true covariances of the air and of all errors, m/s
     /// (at one second in ten); absent: these are not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -78,7 +78,7 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
         return None;
     }
     let n = check.values as f64;
-    let share = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { 0.0 };
+    let share = |count: usize, of: usize| (of > 0).then(|| count as f64 / of as f64);
     check.bias_mps = sum / n;
     check.rms_mps = (squares / n).sqrt();
     check.zero_rms_mps = (true_squares / n).sqrt();
@@ -133,8 +133,8 @@ mod tests {
         assert!((found.bias_mps - 0.1).abs() < 1e-12);
         assert!((found.rms_mps - (0.05_f64 / 3.0).sqrt()).abs() < 1e-12);
         assert!((found.zero_rms_mps - (0.14_f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert!((found.inside_share - 2.0 / 3.0).abs() < 1e-12);
-        assert_eq!(found.means_inside_share, 1.0, "0.2 is in 0.0 to 0.3");
+        assert!((found.inside_share.unwrap() - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(found.means_inside_share, Some(1.0), "0.2 is in 0.0 to 0.3");
         assert_eq!(check(&[drone(vec![Some(1.0)], None)]), None);
     }
 }

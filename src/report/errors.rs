@@ -49,11 +49,19 @@ const KINDS: [BudgetRow; 7] = [
 pub(super) fn section(map: &UpdraftMap) -> Value {
     let truth = map.truth.filter(|truth| truth.values > 0 && usable(truth.rms_mps)).map(|truth| {
         let percent = |share: f64| fixed(100.0 * share, 1);
+        let shares = truth.inside_share.zip(truth.means_inside_share);
+        let inside = shares.map_or_else(String::new, |(values, means)| {
+            format!(
+                "; {} % of the true values lie inside their 95 % intervals, and so do the true means of {} % of \
+                 the drones",
+                percent(values),
+                percent(means)
+            )
+        });
         let of_means = fleet_air(map).and_then(|air| air.rms_error);
         format!(
             "Estimate and truth: over {} (running means of 10 s) of {}, W* − W has a root mean square \
-             of {} m/s and a mean of {} m/s ({} m/s without that mean){}; {} % of the true values lie \
-             inside their 95 % intervals, and so do the true means of {} % of the drones.",
+             of {} m/s and a mean of {} m/s ({} m/s without that mean){}{inside}.",
             count(truth.values, "value"),
             count(truth.drones, "drone"),
             fixed(truth.rms_mps, 3),
@@ -63,8 +71,6 @@ pub(super) fn section(map: &UpdraftMap) -> Value {
                 "; that of means over the hover has {} m/s",
                 fixed(rms, 3)
             )),
-            percent(truth.inside_share),
-            percent(truth.means_inside_share),
         )
     });
     context! { budget => budget(map), truth, quality => doubts(map), coverage => coverage(map) }

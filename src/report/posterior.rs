@@ -3,7 +3,7 @@
 use crate::analysis::result::{AirScales, PosteriorMap, PosteriorScale, UpdraftMap};
 use crate::base::estimate::Estimate;
 
-use super::text::{clean, count, estimate, fixed, signed, usable, value_of};
+use super::text::{clean, count, estimate, fixed, share, signed, usable, value_of};
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
@@ -138,9 +138,9 @@ fn truth(map: &UpdraftMap, posterior: &PosteriorMap) -> Vec<String> {
         fixed(truth.rms_mps, 3),
         signed(truth.bias_mps, 3),
         fixed(truth.rms_without_bias_mps, 3),
-        fixed(100.0 * truth.inside_share, 1),
+        share(truth.inside_share),
         count(truth.values, "true value"),
-        fixed(100.0 * truth.means_inside_share, 1),
+        share(truth.means_inside_share),
         count(truth.drones, "true mean"),
     )];
     let limit = truth.limit_rms_mps.filter(|limit| usable(*limit) && *limit > 0.0);

@@ -21,7 +21,9 @@ use super::page::capitalised;
 use super::posterior;
 use super::statistics_lines::statistics_lines;
 use super::table::{Align, Column, column, lines};
-use super::text::{NONE, clean, count, fixed, prose_width, purpose, shortened, signed, usable};
+use super::text::{
+    NONE, clean, count, fixed, prose_width, purpose, share, shortened, signed, usable,
+};
 
 /// The table of drones shows no more; all are in the report.
 const DRONE_LIMIT: usize = 64;
@@ -368,9 +370,9 @@ impl Output {
                     fixed(truth.zero_rms_mps, 3),
                     signed(truth.bias_mps, 3),
                     fixed(truth.rms_without_bias_mps, 3),
-                    fixed(100.0 * truth.inside_share, 1),
+                    share(truth.inside_share),
                     truth.values,
-                    fixed(100.0 * truth.means_inside_share, 1),
+                    share(truth.means_inside_share),
                     truth.drones,
                 ),
             );

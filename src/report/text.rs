@@ -59,6 +59,11 @@ pub(super) fn slug(text: &str) -> String {
     if slug.is_empty() { "unnamed".to_owned() } else { slug.to_owned() }
 }
 
+/// A share as per cent with one decimal.
+pub(super) fn share(of: Option<f64>) -> String {
+    of.map_or_else(|| NONE.to_owned(), |of| fixed(100.0 * of, 1))
+}
+
 /// A number with a true minus sign.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {

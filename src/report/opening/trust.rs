@@ -139,12 +139,13 @@ fn largest_error(map: &UpdraftMap) -> Option<Doubt> {
 fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
     let posterior = map.posterior.as_ref().and_then(|posterior| posterior.truth);
     let truth = posterior.or(map.truth).filter(|truth| truth.values > 0)?;
-    (usable(truth.inside_share) && truth.inside_share < LEAST_INSIDE).then(|| {
+    let inside = truth.inside_share.filter(|share| usable(*share))?;
+    (inside < LEAST_INSIDE).then(|| {
         (
             1,
             format!(
                 "The errors are too small here: only {} % of the true values lie inside their 95 % intervals.",
-                fixed(100.0 * truth.inside_share, 0)
+                fixed(100.0 * inside, 0)
             ),
         )
     })

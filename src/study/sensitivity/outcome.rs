@@ -159,8 +159,8 @@ impl Outcome {
             ratio_to_zero: over(rms_mps, zero_rms_mps),
             bias_mps: Some(check.bias_mps),
             rms_without_bias_mps: Some(check.rms_without_bias_mps),
-            coverage: Some(check.inside_share),
-            means_coverage: Some(check.means_inside_share),
+            coverage: check.inside_share,
+            means_coverage: check.means_inside_share,
             width_ratio: rms(sds).and_then(|sd| over(sd, rms_mps)),
             ratio_to_limit: check
                 .at_limit_rms_mps

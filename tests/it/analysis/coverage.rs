@@ -106,7 +106,7 @@ fn share(vehicle: &str, (name, air): (&str, &str), size: &str, seeds: std::ops::
         seeds.into_par_iter().map(|seed| campaign(vehicle, air, size, seed)).collect();
     let n = outcomes.len() as f64;
     let mean = |value: fn(&Outcome) -> f64| outcomes.iter().map(value).sum::<f64>() / n;
-    let share = mean(|one| one.truth.inside_share);
+    let share = mean(|one| one.truth.inside_share.unwrap());
     let [low, high] = wilson(share, n);
     println!(
         "{vehicle}, {name}: {n} campaigns, {:.1} % of values inside ({:.0} to {:.0} %), {:.1} % of \
@@ -114,7 +114,7 @@ fn share(vehicle: &str, (name, air): (&str, &str), size: &str, seeds: std::ops::
         100.0 * share,
         100.0 * low,
         100.0 * high,
-        100.0 * mean(|one| one.truth.means_inside_share),
+        100.0 * mean(|one| one.truth.means_inside_share.unwrap()),
         mean(|one| one.truth.rms_mps.powi(2)).sqrt(),
         mean(|one| one.truth.rms_without_bias_mps.powi(2)).sqrt(),
         mean(|one| one.common.se_mps.powi(2)).sqrt(),

@@ -4,7 +4,7 @@ use std::fs;
 
 use insta::assert_snapshot;
 
-use crate::cli::support::{Bench, contents};
+use crate::cli::support::{Bench, SHORT, contents};
 
 #[test]
 fn a_campaign_becomes_laws_and_a_report() {
@@ -33,6 +33,24 @@ fn a_campaign_becomes_laws_and_a_report() {
     let value = json.json("updraft.analyze/1");
     assert_eq!(value["analysis"]["flights"][0]["drones"].as_array().unwrap().len(), 2);
     assert!(value["report"].is_null());
+}
+
+#[test]
+fn an_estimate_without_errors_has_no_share_of_values_inside_of_them() {
+    let bench = Bench::new();
+    let run = ["run", "--direct", "--no-study", "--quiet", "--grid", "2x2", "--duration", "40"];
+    bench.expect(0, &[&run[..], &["-o", "flown"], SHORT].concat());
+    let truth = |more: &[&str]| {
+        let args = [&["analyze", "flown", "--json", "--quiet"][..], more].concat();
+        let found = bench.expect(0, &args).json("updraft.analyze/1");
+        found["analysis"]["flights"][1]["map"]["truth"].clone()
+    };
+    let with_errors = truth(&["--no-report"]);
+    assert!(with_errors["inside_share"].is_number(), "{with_errors}");
+    let plain = truth(&["--plain"]);
+    assert!(plain["rms_mps"].is_number() && plain["inside_share"].is_null(), "{plain}");
+    let page = fs::read_to_string(bench.path("flown/report/index.html")).unwrap();
+    assert!(page.contains("root mean square") && !page.contains("errors are too small"));
 }
 
 #[test]

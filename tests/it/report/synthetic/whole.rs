@@ -73,8 +73,8 @@ pub(crate) fn whole_campaign() -> Analysis {
         rms_mps: 0.101,
         bias_mps: -0.034,
         rms_without_bias_mps: 0.095,
-        inside_share: 0.953,
-        means_inside_share: 0.976,
+        inside_share: Some(0.953),
+        means_inside_share: Some(0.976),
         limit_rms_mps: None,
         at_limit_rms_mps: None,
     });
