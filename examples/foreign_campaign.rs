@@ -6,8 +6,8 @@
 //! updraft analyze FOLDER
 //! ```
 //!
-//! The kind is `still`, `field`, `gusty`, `anisotropic`, `advected`, `wind-change`, `thermal` or `drifting-thermal`; after `scan-` the
-//! fleet flies `scan-campaign`. `truth.csv` has the mean of the true vertical air speed over the 10 s around each second,
+//! The kind is `still`, `field`, `gusty`, `anisotropic`, `advected`, `turbulent`, `wind-change`, `thermal` or `drifting-thermal`; after
+//! `scan-` the fleet flies `scan-campaign`. `truth.csv` has the mean of the true vertical air speed over the 10 s around each second,
 //! along the planned way; `truth-thermal.json` the thermal. A fourth argument is the side of the grid (5), a fifth the
 //! distance of its drones (10 m). Arguments with an equals sign, wherever behind the folder, set values of the campaign's
 //! templates: `'calibration.legs.speeds_mps=[3, 6]'`, `'hover.legs.speeds_mps=[3, 6]'`. With `telemetry=true` the logs

@@ -444,7 +444,7 @@ pub struct AirScales {
     pub gust_mps: f64,
     /// Their time scale, s.
     pub gust_s: f64,
-    /// Standard deviation of slow air besides, which varies over 145 m and 186 s, m/s.
+    /// Standard deviation of slow air besides, which does not drift and varies over 145 m and 186 s, m/s.
     #[serde(default)]
     pub slow_mps: f64,
 }

@@ -79,6 +79,9 @@ fn filled(posterior: &PosteriorMap) -> Option<String> {
     (n > 0).then(|| format!("{} filled from {whose} neighbours", count(n, "lost drone")))
 }
 
+/// Slow air is told where it has this share of the field's strength. Convention.
+const SLOW_SHARE: f64 = 0.5;
+
 fn scale_words(scales: &AirScales) -> String {
     let speed = scales.drift_mps[0].hypot(scales.drift_mps[1]);
     let drift = if usable(speed) && speed >= 0.05 {
@@ -86,8 +89,14 @@ fn scale_words(scales: &AirScales) -> String {
     } else {
         String::new()
     };
+    let slow = scales.slow_mps;
+    let slow = if usable(slow) && slow >= SLOW_SHARE * scales.sd_mps && slow >= 0.05 {
+        format!("; slow air besides, which stays, of {} m/s", fixed(slow, 2))
+    } else {
+        String::new()
+    };
     format!(
-        "Scales of the air by likelihood: length {}, time {}, of a field ({} correlation) of {} m/s{drift}; gusts of \
+        "Scales of the air by likelihood: length {}, time {}, of a field ({} correlation) of {} m/s{drift}{slow}; gusts of \
          each drone's own of {} m/s over {} s.",
         scale(scales.length_m, "m"),
         scale(scales.time_s, "s"),

@@ -13,17 +13,16 @@ pub(super) fn along(
     apart_s: f64,
     [one_mps, other_mps]: [[f64; 3]; 2],
 ) -> f64 {
-    let slow = covariance.slow(apart_m, apart_s);
     let moved = |one_s: f64, other_s: f64| {
         let apart_m =
             [0, 1, 2].map(|axis| apart_m[axis] + one_mps[axis] * one_s - other_mps[axis] * other_s);
-        covariance.instant_field(apart_m, apart_s + one_s - other_s)
+        covariance.instant(apart_m, apart_s + one_s - other_s)
     };
     let is_beside = (0..3).all(|axis| (one_mps[axis] - other_mps[axis]).abs() < SIDE_BY_SIDE_MPS);
     if is_beside {
         // Only the difference of the two times counts.
         let each = DIFFERENCES.iter().map(|(at, weight)| weight * moved(at * RUNNING_S, 0.0));
-        return slow + each.sum::<f64>();
+        return each.sum();
     }
     let mut sum = 0.0;
     for one in WINDOW {
@@ -31,7 +30,7 @@ pub(super) fn along(
             sum += moved(one * RUNNING_S, other * RUNNING_S);
         }
     }
-    slow + sum / (WINDOW.len() * WINDOW.len()) as f64
+    sum / (WINDOW.len() * WINDOW.len()) as f64
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Families of air in records that are drawn from their covariances.
 
-use super::covariance::{Air, Form};
+use super::covariance::{Air, Covariance, Form};
 use super::scales::air_of;
 use super::thermals::tests::{Fleet, air, made, scales_of};
 
@@ -22,7 +22,10 @@ fn gusts_that_the_wind_carries_over_air_that_stays_are_both_found() {
         let found = air_of(found.family, &found.best, Some(WIND_MPS));
         println!("{found:?}");
         assert!(found.drift_mps[0] > 1.0, "{found:?}");
-        assert!((8.0..60.0).contains(&found.length_m), "{found:?}");
+        // Forms fall in different ways over their lengths: 0.37 is true here, and a field of 145 m has 0.87.
+        let field = Covariance::new(found);
+        let alike = field.instant_field([20.0, 0.0, 0.0], 0.0) / found.sd_mps.powi(2);
+        assert!((0.1..0.75).contains(&alike), "{alike}: {found:?}");
         slow.push(found.slow_mps.ln());
     }
     let slow_mps = (slow.iter().sum::<f64>() / slow.len() as f64).exp();
