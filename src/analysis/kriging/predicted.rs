@@ -1,4 +1,4 @@
-//! What a model says of all places that a map has: at the drones, where logs are lost, and between them.
+//! Prediction of a model at all places that a map has: at the drones, where logs are lost, and between them.
 
 use super::data::{Drone, Rows};
 use super::grid::{Grid, grid};

@@ -139,7 +139,7 @@ pub(super) struct Search<'a> {
     pub(super) factor: Common,
 }
 
-/// What a likelihood takes the field for: airs between which no scale leads over.
+/// Kind of air that a likelihood takes the field for; no scale leads over from one to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Family {
     pub(super) form: Form,
