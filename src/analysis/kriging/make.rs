@@ -210,7 +210,7 @@ fn mapped(
         let components = components(&air);
         let (at_best, ..) = mixed(std::iter::once((1.0, &choices(&system, &components)[..])))?;
         predicted.add(&thermals, &values.rows, input.drones, &sites);
-        // What one standard error of each of a thermal's numbers changes, of which there are as many as directions.
+        // The whole map changes with a thermal's numbers: by one standard error in each independent direction.
         let mut others = Vec::new();
         for aside in asides(&thermals) {
             let drones = less(input.drones, &aside);
