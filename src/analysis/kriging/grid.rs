@@ -44,16 +44,14 @@ impl Grid {
         }
     }
 
-    /// Widens standard deviations by how far others of the same cells are off.
-    pub(super) fn widen<'a>(&mut self, others: impl Iterator<Item = &'a Self>) {
-        for other in others {
-            let own = self.mean_mps.iter().flatten().flatten();
-            let sds = self.sd_mps.iter_mut().flatten().flatten();
-            let there = other.mean_mps.iter().flatten().flatten();
-            for ((value, sd), there) in own.zip(sds).zip(there) {
-                if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
-                    *sd = sd.hypot(there - value);
-                }
+    /// Widens standard deviations by how far another of the same cells is off.
+    pub(super) fn widen(&mut self, other: &Self) {
+        let own = self.mean_mps.iter().flatten().flatten();
+        let sds = self.sd_mps.iter_mut().flatten().flatten();
+        let there = other.mean_mps.iter().flatten().flatten();
+        for ((value, sd), there) in own.zip(sds).zip(there) {
+            if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
+                *sd = sd.hypot(there - value);
             }
         }
     }

@@ -211,7 +211,6 @@ fn mapped(
         let (at_best, ..) = mixed(std::iter::once((1.0, &choices(&system, &components)[..])))?;
         predicted.add(&thermals, &values.rows, input.drones, &sites);
         // The whole map changes with a thermal's numbers: by one standard error in each independent direction.
-        let mut others = Vec::new();
         for aside in asides(&thermals) {
             let drones = less(input.drones, &aside);
             let rows = Rows::of(&drones, values.first, STEP);
@@ -222,9 +221,8 @@ fn mapped(
             let model = Model { drones: &drones, covariance: covariance_of_air, linear };
             let mut other = Predicted::of(&model, &rows, &sites);
             other.add(&aside, &rows, input.drones, &sites);
-            others.push(other);
+            predicted.widen(&other);
         }
-        predicted.widen(&others);
     }
     let Predicted { mut drones, lost, grid, fleet_mps } = predicted;
     for (series, drone) in drones.iter_mut().zip(input.drones) {

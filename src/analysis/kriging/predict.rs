@@ -264,18 +264,16 @@ impl Series {
         }
     }
 
-    /// Widens standard deviations by how far others are off.
-    pub(super) fn widen<'a>(&mut self, others: impl Iterator<Item = &'a Self>) {
-        for other in others {
-            let own = self.mean_mps.iter().zip(&mut self.sd_mps).zip(&other.mean_mps);
-            for ((value, sd), there) in own {
-                if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
-                    *sd = sd.hypot(there - value);
-                }
+    /// Widens standard deviations by how far another is off.
+    pub(super) fn widen(&mut self, other: &Self) {
+        let own = self.mean_mps.iter().zip(&mut self.sd_mps).zip(&other.mean_mps);
+        for ((value, sd), there) in own {
+            if let (Some(value), Some(sd), Some(there)) = (value, sd, there) {
+                *sd = sd.hypot(there - value);
             }
-            if let (Some((value, sd)), Some((there, _))) = (&mut self.over_all, other.over_all) {
-                *sd = sd.hypot(there - *value);
-            }
+        }
+        if let (Some((value, sd)), Some((there, _))) = (&mut self.over_all, other.over_all) {
+            *sd = sd.hypot(there - *value);
         }
     }
 

@@ -69,22 +69,18 @@ impl Predicted {
         }
     }
 
-    /// Widens standard deviations by how far others are off, each of which has an independent error of one standard deviation.
-    pub(super) fn widen(&mut self, others: &[Self]) {
-        let lists: [fn(&mut Self) -> &mut Vec<Series>; 2] =
-            [|all| &mut all.drones, |all| &mut all.lost];
-        let read: [fn(&Self) -> &Vec<Series>; 2] = [|all| &all.drones, |all| &all.lost];
-        for (list, read) in lists.into_iter().zip(read) {
-            for (index, series) in list(self).iter_mut().enumerate() {
-                series.widen(others.iter().filter_map(|other| read(other).get(index)));
-            }
+    /// Widens standard deviations by how far another is off that has an independent error of one standard deviation.
+    pub(super) fn widen(&mut self, other: &Self) {
+        let drones = self.drones.iter_mut().zip(&other.drones);
+        let lost = self.lost.iter_mut().zip(&other.lost);
+        for (series, there) in drones.chain(lost) {
+            series.widen(there);
         }
-        if let Some(grid) = &mut self.grid {
-            grid.widen(others.iter().filter_map(|other| other.grid.as_ref()));
+        if let (Some(grid), Some(there)) = (&mut self.grid, &other.grid) {
+            grid.widen(there);
         }
-        if let Some((fleet, sd)) = &mut self.fleet_mps {
-            let off = |other: &Self| other.fleet_mps.map_or(0.0, |(there, _)| there - *fleet);
-            *sd = others.iter().map(off).fold(*sd, f64::hypot);
+        if let (Some((fleet, sd)), Some((there, _))) = (&mut self.fleet_mps, other.fleet_mps) {
+            *sd = sd.hypot(there - *fleet);
         }
     }
 }

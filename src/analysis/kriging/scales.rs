@@ -209,7 +209,7 @@ pub(super) fn open_factor(factor: &Common) -> Common {
     open
 }
 
-/// Where a search for the scales of one form ended.
+/// Where a search for the scales of one family ended.
 #[derive(Clone, Copy, Debug)]
 struct Top {
     family: Family,
@@ -277,7 +277,7 @@ impl Search<'_> {
         Top::of(family, minimise_roughly(start, None, enough, loss, slopes))
     }
 
-    /// The most probable scales, over forms and starts.
+    /// The most probable scales, over families and starts.
     #[cfg(test)]
     pub(super) fn best(&self) -> Option<Found> {
         self.all().into_iter().next()
