@@ -103,6 +103,13 @@ impl<'a> Aware<'a> {
         counted.filter_map(|drone| drone.home_m).collect()
     }
 
+    /// Constants of the drones' own laws with these places, us and m.
+    pub(super) fn constants_us(&self) -> Vec<([f64; 2], f64)> {
+        let all = self.reference.drones.iter().zip(&self.zero.drones);
+        let counted = all.filter(|(drone, _)| counts(self.reference, drone));
+        counted.filter_map(|(drone, law)| Some((drone.home_m?, law.as_ref()?.law[0]))).collect()
+    }
+
     /// Where a drone of a slot hovered in the calibration, show frame, m; `None` if it has no law of its own.
     pub(super) fn home_m(&self, slot: u16) -> Option<[f64; 2]> {
         let drone = self.reference.drones.iter().find(|drone| drone.slot == Some(slot))?;

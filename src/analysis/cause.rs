@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::calibrate::CalibrationError;
+use super::level::LEAST_ZERO_S;
 use super::running::RUNNING_S;
 use crate::base::said::said_in_files;
 use crate::base::sentence::Sentence;
@@ -251,13 +252,19 @@ impl Cause {
                 format!("the {}'s pulses are outside of the law's range", way(*track)).into()
             }
             Self::Gaps => "the hover has no 10 s without a gap in the log".into(),
-            Self::ZeroOutside { zero_s: [from, to], hover_s: [first, last] } => format!(
-                "the stretch {from:.0} to {to:.0} s that sets the zero has no 10 s of this hover, or is \
-                 not within it: it lasts from {first:.0} to {last:.0} s of the table; give a stretch of \
-                 it (--zero {first:.0}..{:.0}s)",
-                f64::midpoint(*first, *last)
-            )
-            .into(),
+            Self::ZeroOutside { zero_s: [from, to], hover_s: [first, last] } => {
+                let half = f64::midpoint(*first, *last);
+                let advice = if half - first < LEAST_ZERO_S {
+                    "too short to set a zero of its own".to_owned()
+                } else {
+                    format!("give a stretch of it (--zero {first:.0}..{half:.0}s)")
+                };
+                format!(
+                    "the stretch {from:.0} to {to:.0} s that sets the zero has no 10 s of this hover, or is \
+                     not within it: it lasts from {first:.0} to {last:.0} s of the table; {advice}"
+                )
+                .into()
+            }
             Self::NoResponse => "nothing says how the rotor effort answers the air: give --vehicle, or \
                                  a calibration flight in the mapping"
                 .into(),

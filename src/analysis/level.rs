@@ -4,6 +4,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Shortest stretch that sets a zero, s: three running means of 10 s.
+pub const LEAST_ZERO_S: f64 = 30.0;
 /// Drones whose level is told.
 const MOST_TOLD: usize = 4;
 
@@ -47,6 +49,10 @@ pub struct DroneLevel {
     pub integral_time_s: f64,
     /// Standard deviation between the air at the drone and at an instrument beside it, m/s.
     pub apart_mps: f64,
+    /// Change of the effort with the vertical speed over the calibration's legs, indicator's unit per m/s, where it is so
+    /// far from the response's that the response is hardly that of this drone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub legs_slope: Option<f64>,
 }
 
 /// Errors against an instrument beside the drone, outside of the zero stretch. All are root mean squares over means of
@@ -94,8 +100,14 @@ impl LevelledMap {
             } else {
                 String::new()
             };
+            let legs = drone.legs_slope.map_or_else(String::new, |slope| {
+                format!(
+                    "; the calibration's legs have {slope:.0} {unit} per m/s: this is hardly the response of this \
+                     drone, and its values are no measurement"
+                )
+            });
             format!(
-                "{}: {:.0} {unit} per m/s{wind}; the level is known to \u{b1}{:.2} m/s (95 %); {:.0} % of the values' \
+                "{}: {:.0} {unit} per m/s{wind}{legs}; the level is known to \u{b1}{:.2} m/s (95 %); {:.0} % of the values' \
                  deviation is kept (their s.d. {:.2} m/s, known noise {:.2} m/s)",
                 drone.name,
                 drone.slope,

@@ -30,6 +30,9 @@ const BESIDE_M: f64 = 10.0;
 const SLOWEST_MPS: f64 = 0.5;
 /// Wind where the response does not tell it from the leans, m/s: a usual day's. Chosen.
 const UNKNOWN_WIND_MPS: f64 = 3.0;
+/// Further than this factor from the slope of the calibration's legs a response is another vehicle's. The Phantom's own is
+/// 1.4 times as steep in its wind.
+const MOST_STEEPER: f64 = 2.5;
 /// Standard error of the air's density between a calibration and another flight that is not of the same record,
 /// relative: 6 K of temperature. Chosen.
 const DAY_DENSITY: f64 = 0.02;
@@ -201,6 +204,10 @@ pub(super) fn measure(
             gain,
             integral_time_s: steady.map_or(0.0, |steady| steady.time_s.value),
             apart_mps: apart_mps(steady, distance_m, carried_mps),
+            legs_slope: line.map(|(slope, _)| slope).filter(|slope| {
+                let steeper = response.slope(0.0, 0.0).map_or(1.0, |own| own / slope);
+                !(MOST_STEEPER.recip()..=MOST_STEEPER).contains(&steeper)
+            }),
         },
     };
     let measured = Measured {

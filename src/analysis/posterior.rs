@@ -77,7 +77,8 @@ pub(super) fn add(
         drones: &drones,
         lost_m: &lost_m,
         seconds: map.time_s.len(),
-        calibration: Calibration::new(&aware.zero.windows, &homes_m, aware.slope()),
+        calibration: Calibration::new(&aware.zero.windows, &homes_m, aware.slope())
+            .with_constants(&aware.constants_us()),
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
     let Some(found) = posterior(&input) else { return };

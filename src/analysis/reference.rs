@@ -5,7 +5,8 @@ use super::kind::LawOf;
 use super::result::{DroneAnalysis, FlightAnalysis};
 use super::window::WindowStats;
 
-/// A drone in a reference calibration: of the same slot, else of the same name.
+/// A drone in a reference calibration: of the same slot, else of the same name. A log without a plan that is named as
+/// those of a slot are (`07.BIN`) is of this slot; `00000007.BIN` is an autopilot's count.
 pub(super) fn same_drone<'a>(
     reference: &'a FlightAnalysis,
     slot: Option<u16>,
@@ -13,6 +14,7 @@ pub(super) fn same_drone<'a>(
 ) -> Option<&'a DroneAnalysis> {
     let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
         (Some(slot), Some(other)) => slot == other,
+        (None, Some(other)) => drone.name == name || name == format!("{other:02}"),
         _ => drone.name == name,
     };
     reference.drones.iter().find(same)

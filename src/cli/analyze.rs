@@ -134,7 +134,8 @@ pub(super) struct AnalyzeOptions {
     #[arg(long, value_name = "M", value_parser = depth)]
     mixed_layer_depth: Option<f64>,
     /// Give the paper's own estimate, for comparison: its two laws alone, and the map drone by drone
-    /// and second by second from them (eqs. 6 and 7)
+    /// and second by second from them (eqs. 6 and 7). The map is still corrected for density, and for
+    /// wind where it can be from drag alone; the paper did neither (--no-density --no-wind)
     #[arg(long)]
     plain: bool,
 }
@@ -304,6 +305,12 @@ impl AnalyzeArgs {
             return Err(WorkflowError::Usage(format!(
                 "{asked} is for tables: give their mapping file with --csv. The zero of a campaign's \
                  logs comes from its calibration flight, and their vehicle from its folder"
+            )));
+        }
+        if self.options.plain || self.options.paper {
+            return Err(WorkflowError::Usage(format!(
+                "{asked} gives a table its vehicle's response, and the paper's own estimate (--plain, --paper) knows \
+                 its two laws alone: leave out one of them"
             )));
         }
         let zero_s = self.zero.map(|ZeroStretch(zero_s)| zero_s);

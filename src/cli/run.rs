@@ -34,10 +34,11 @@ const SHOW_DRONE: &str = "pixel";
   updraft run --hide 7 -o hidden                    # an effect is hidden, searched for, and revealed
 
 Without --vehicle, the paper's campaign (`campaign`) is flown by the show drone (`pixel`), and any
-other template by the vehicle it names (airsim-generic-quad in the built-in ones). Without --air it
-is a field day: turbulent air, light wind, gusts. --air sets the air of both flights (`still` for
-none); --calibration-air, --calibration-wind and --calibration-updraft set that of the calibration.
---wind and --updraft are uniform and apply to the measurement. The true air is kept beside the logs
+other template by the vehicle it names (airsim-generic-quad in the built-in ones). Where nothing is said
+about the air it is a field day: turbulent air, light wind, gusts. --air sets the air of both flights
+(`still` for none, `field-day` for the field day); --calibration-air, --calibration-wind and
+--calibration-updraft set that of the calibration. --wind and --updraft are uniform and apply to the
+measurement; with one of them and without --air the air is still otherwise. The true air is kept beside the logs
 and compared with the results. The paper's simulation study is flown into study/, for Fig. 2 and
 Table I. Running the same command again resumes an interrupted run.
 

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-/// Shortest stretch, s: three running means of 10 s.
-const SHORTEST_S: f64 = 30.0;
+use crate::analysis::level::LEAST_ZERO_S;
+
 /// How a stretch is written.
 const FORM: &str = "write a stretch of the hover with its unit, for example 0..150s or 1..2.5min";
 
@@ -29,9 +29,9 @@ impl FromStr for ZeroStretch {
         if to_s < from_s {
             return Err(format!("it ends before it begins: turn it round, {to_s}..{from_s}s"));
         }
-        if to_s - from_s < SHORTEST_S {
+        if to_s - from_s < LEAST_ZERO_S {
             return Err(format!(
-                "it lasts {} s, and the mean of the air over less than {SHORTEST_S} s says nothing: give a longer \
+                "it lasts {} s, and the mean of the air over less than {LEAST_ZERO_S} s says nothing: give a longer \
                  stretch",
                 to_s - from_s
             ));

@@ -23,6 +23,10 @@ pub(super) fn interval(of: Estimate) -> String {
     format!("95 %: {} to {} m/s", at(-NORMAL), at(NORMAL))
 }
 
+/// Why there is none.
+const NO_POSTERIOR: &str = "No posterior map: it takes three drones that hover, and of all together 24 values that share no \
+                            second.";
+
 /// The posterior in a headline; `None` without one.
 pub(super) fn headline(map: &UpdraftMap) -> Option<String> {
     let fleet = fleet(map)?;
@@ -35,9 +39,12 @@ pub(super) fn headline(map: &UpdraftMap) -> Option<String> {
     ))
 }
 
-/// All that is to be said, sentence by sentence; empty without a posterior.
+/// All that is to be said, sentence by sentence; empty for the paper's own estimate.
 pub(super) fn sentences(map: &UpdraftMap) -> Vec<String> {
-    let Some(posterior) = map.posterior.as_ref() else { return Vec::new() };
+    let Some(posterior) = map.posterior.as_ref() else {
+        let is_plain = map.common.is_none();
+        return if is_plain { Vec::new() } else { vec![NO_POSTERIOR.to_owned()] };
+    };
     let mut sentences = Vec::new();
     if let Some(fleet) = fleet(map) {
         sentences.push(format!(

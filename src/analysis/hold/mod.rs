@@ -172,7 +172,8 @@ impl<'a> Holding<'a> {
             .collect();
         let flights = Flights { there: &there, here, sigmas: &self.sigmas, spread };
         let wind_mps = self.wind_mps(&there, here);
-        Some(self.words(here, shift(&flights)?, wind_mps))
+        let slopes = slope_of(&there).zip(slope_of(here));
+        Some(self.words(here, shift(&flights)?, wind_mps, slopes))
     }
 
     /// Standard error of the shift by wind: that the corrections are off by their doubt, or, where there are none,
@@ -189,7 +190,13 @@ impl<'a> Holding<'a> {
     }
 
     /// The result in its words.
-    fn words(&self, here: &[Point], found: Shift, wind_mps: f64) -> HeldCurve {
+    fn words(
+        &self,
+        here: &[Point],
+        found: Shift,
+        wind_mps: f64,
+        slopes: Option<(f64, f64)>,
+    ) -> HeldCurve {
         let origin = self.origin.unwrap_or_default();
         let legs = || here.iter().filter(|point| point.is_leg);
         let [low, high] = found.speeds_mps;
@@ -200,7 +207,17 @@ impl<'a> Holding<'a> {
         let beyond = beyond_at(found.mean_mps);
         let few = legs().count().saturating_sub(beyond) < FEWEST_INSIDE;
         let stormy = wind_mps > MOST_WIND_MPS;
-        let doubt = if found.is_open {
+        let other = slopes.filter(|(there, here)| {
+            let steeper = here / there;
+            !(MOST_STEEPER.recip()..=MOST_STEEPER).contains(&steeper)
+        });
+        let doubt = if let Some((there, here)) = other {
+            let unit = self.reference.indicator.unit();
+            Some(format!(
+                "W is not determined: over the ladder the indicator changes by {here:.1} {unit} per m/s and over the \
+                 calibration by {there:.1}: this is the calibration of another vehicle"
+            ))
+        } else if found.is_open {
             Some(format!(
                 "W is not determined: the windows allow air beyond {:.0} m/s",
                 shift::FASTEST_MPS
@@ -218,11 +235,13 @@ impl<'a> Holding<'a> {
             )
         } else if wind_mps > WINDY_MPS && wind_mps > found.sd_mps {
             Some(format!(
-                "the drones leaned otherwise than in the calibration: what wind along their rotor axes may                  have done is most of the error, {wind_mps:.2} m/s"
+                "the drones leaned otherwise than in the calibration: what wind along their rotor axes may \
+                 have done is most of the error, {wind_mps:.2} m/s"
             ))
         } else if found.chi2_reduced.is_some_and(|chi2| chi2 > MISFIT_CHI2) {
             Some(
-                "the ladder's windows scatter about the calibration's curve by more than its own do: its                  air moved more, or it has another shape"
+                "the ladder's windows scatter about the calibration's curve by more than its own do: its \
+                 air moved more, or it has another shape"
                     .to_owned(),
             )
         } else {
@@ -234,7 +253,7 @@ impl<'a> Holding<'a> {
                 )
             })
         };
-        let known = !(found.is_open || few || stormy);
+        let known = !(found.is_open || few || stormy) && other.is_none();
         let se_more = wind_mps.hypot(origin.se);
         let end = |end: f64| {
             let off = end - found.mean_mps;
@@ -254,8 +273,23 @@ impl<'a> Holding<'a> {
     }
 }
 
+/// Slope of a line through the legs; `None` with fewer than three.
+fn slope_of(points: &[Point]) -> Option<f64> {
+    let legs = || points.iter().filter(|point| point.is_leg);
+    let (speed, pulse) =
+        (mean(legs().map(|leg| leg.velocity_mps))?, mean(legs().map(|leg| leg.pulse_us))?);
+    let over = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        legs().map(|leg| of(leg.velocity_mps - speed, leg.pulse_us - pulse)).sum()
+    };
+    let slope = over(&|v, u| v * u) / over(&|v, _| v * v);
+    (slope.is_finite() && legs().count() >= FEWEST_INSIDE).then_some(slope)
+}
+
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
+/// The same drone's ladder is steeper or flatter than its calibration by this factor at most: a square law in an updraft of
+/// half the ladder's speed by 1.5.
+const MOST_STEEPER: f64 = 2.0;
 /// An error by wind below this is not worth a sentence, m/s. Chosen, as for maps.
 const WINDY_MPS: f64 = 0.05;
 /// With a larger error by wind, a shift of the air's usual size is not determined, m/s. Chosen.
@@ -274,4 +308,47 @@ fn pack_of(drone: &DroneAnalysis, battery: Option<BatteryCorrection>) -> Option<
 fn line(laws: &Laws) -> Option<(f64, f64)> {
     let fit = laws.linear.as_ref()?;
     Some((fit.value(super::law::Symbol::U0)?, fit.value(super::law::Symbol::Slope)?))
+}
+
+#[cfg(test)]
+mod slope_tests {
+    use super::*;
+
+    fn leg(velocity_mps: f64, pulse_us: f64) -> Point {
+        Point {
+            key: (0, 0, 0),
+            is_leg: true,
+            time_s: 0.0,
+            velocity_mps,
+            pulse_us,
+            noise_us: 0.1,
+            velocity_noise_mps: 0.0,
+            axial_mps: 0.0,
+            doubts_us: [0.0; DOUBTS],
+        }
+    }
+
+    #[test]
+    fn a_line_through_legs_has_their_slope() {
+        let legs: Vec<Point> = [-2.0, -1.0, 1.0, 2.0].map(|v| leg(v, 1500.0 + 25.0 * v)).into();
+        assert!((slope_of(&legs).unwrap() - 25.0).abs() < 1e-9);
+        assert!(slope_of(&legs[..2]).is_none());
+        assert!(slope_of(&[leg(1.0, 1.0); 3]).is_none());
+    }
+
+    #[test]
+    fn a_square_law_in_an_updraft_is_not_another_vehicle() {
+        let slope = |w_mps: f64| {
+            let of = |v: f64| leg(v, 8.0 * (v - w_mps) * (v - w_mps).abs());
+            let legs: Vec<Point> = (1..=7)
+                .flat_map(|rung| [0.5, -0.5].map(|step| step * f64::from(rung)))
+                .map(of)
+                .collect();
+            slope_of(&legs).unwrap()
+        };
+        for w_mps in [-2.0, -1.0, 1.0, 2.0] {
+            let steeper = slope(w_mps) / slope(0.0);
+            assert!((1.0..0.9 * MOST_STEEPER).contains(&steeper), "{w_mps}: {steeper}");
+        }
+    }
 }

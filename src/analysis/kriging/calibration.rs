@@ -8,13 +8,14 @@ use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::covariance::{Air, Covariance};
 use super::gradient::Plane;
+use super::scatter::Scatter;
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
 
 /// How much stronger the air of the calibration may have been than that of the hover, with weights: hours
 /// apart the air differs by such factors. Chosen.
-const STRENGTHS: [(f64, f64); 3] = [(0.6, 0.25), (1.0, 0.5), (1.7, 0.25)];
+const STRENGTHS: [(f64, f64); 4] = [(0.2, 0.2), (0.6, 0.2), (1.0, 0.4), (1.7, 0.2)];
 /// How much longer the air is in height than on the level, with weights: turbulence is alike in all
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
@@ -82,6 +83,8 @@ pub(in super::super) struct Calibration<'a> {
     stand_ins: f64,
     /// Drones in a window, on average.
     drones: f64,
+    /// How the drones' constants scatter; `None` for too few drones.
+    scatter: Option<Scatter>,
 }
 
 impl<'a> Calibration<'a> {
@@ -112,7 +115,20 @@ impl<'a> Calibration<'a> {
             misfit,
             stand_ins: count.max(1) as f64,
             drones: crate::numeric::mean(members).unwrap_or(1.0).max(1.0),
+            scatter: None,
         }
+    }
+
+    /// With the constants of the drones' own laws and where they were flown, us and m.
+    pub(in super::super) fn with_constants(self, constants_us: &[([f64; 2], f64)]) -> Self {
+        let constants_mps: Vec<([f64; 2], f64)> =
+            constants_us.iter().map(|(home_m, us)| (*home_m, us / self.slope)).collect();
+        Self { scatter: Scatter::of(&constants_mps), ..self }
+    }
+
+    /// Logarithm of the likelihood of the drones' constants where air that each met alone adds so much to their variance, (m/s)².
+    fn scatters(&self, by_air: f64) -> f64 {
+        self.scatter.map_or(0.0, |scatter| scatter.ln_likelihood(by_air))
     }
 
     /// Covariance of the averages over drones of the air in two windows, (m/s)²; and of one drone's own deviation from them,
@@ -212,8 +228,9 @@ impl<'a> Calibration<'a> {
         let square = strength * strength;
         let shared = |row, column| square * air.shared[(row, column)] + self.misfit[(row, column)];
         let fit = record.fit_in(shared, white_us)?;
-        let by_field_us2 = square * self.by_air_us2(&fit, &air.by_field);
-        let gradient = plane.slopes * (by_field_us2 / self.slope.powi(2));
+        let by_field = square * self.by_air_us2(&fit, &air.by_field) / self.slope.powi(2);
+        let gradient = plane.slopes * by_field;
+        let ln_scatter = self.scatters(by_field * (1.0 - plane.share));
         let Gls { gain, covariance, log_likelihood } = fit;
         let law = gain * &record.pulse_us;
         let mut shift = [0.0; PARAMETERS];
@@ -221,7 +238,12 @@ impl<'a> Calibration<'a> {
             .iter_mut()
             .zip(law.iter().zip(parameters))
             .for_each(|(shift, (law, used))| *shift = law - used);
-        Some(Component { shift, covariance, gradient, log_weight: log_likelihood + ln_weight })
+        Some(Component {
+            shift,
+            covariance,
+            gradient,
+            log_weight: log_likelihood + ln_scatter + ln_weight,
+        })
     }
 
     /// Variance of the constant that a fit gives by air between windows, us².
@@ -239,11 +261,32 @@ impl<'a> Calibration<'a> {
         let covariance = Covariance::new(*air);
         let Between { by_field, by_gusts, .. } = self.between(&covariance, 1.0);
         let alone = |row, column| by_field[(row, column)] + by_gusts[(row, column)];
-        let own_us2 = self.windows.record.fit_in(alone, OWN_WHITE_US).map(|fit| {
+        let own = self.windows.record.fit_in(alone, OWN_WHITE_US).map(|fit| {
             let plane = Plane::of(&[covariance], self.homes_m);
-            fit.covariance[(0, 0)] - plane.share * self.by_air_us2(&fit, &by_field)
+            let square = self.slope.powi(2);
+            let (all, by_field) =
+                (fit.covariance[(0, 0)] / square, self.by_air_us2(&fit, &by_field) / square);
+            let beside = by_field * (1.0 - plane.share);
+            all - by_field + self.mean_square_strength(beside) * beside
         });
-        own_us2.map_or(0.0, |us2| us2.max(0.0).sqrt() / self.slope)
+        own.map_or(0.0, |square| square.max(0.0).sqrt())
+    }
+
+    /// Mean square of the strength of the calibration's air, by how the drones' constants scatter, where air as strong as the
+    /// hover's adds so much to their variance, (m/s)².
+    fn mean_square_strength(&self, by_air: f64) -> f64 {
+        let weighed = STRENGTHS.map(|(strength, weight)| {
+            let square: f64 = strength * strength;
+            (square, weight.ln() + self.scatters(square * by_air))
+        });
+        let most = weighed.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (square, ln) in weighed {
+            let weight = (ln - most).exp();
+            sum += weight * square;
+            all += weight;
+        }
+        sum / all
     }
 }
 

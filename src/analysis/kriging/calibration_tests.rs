@@ -6,7 +6,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::calibration::Calibration;
 use super::covariance::{Air, Form};
 use super::data::{Drone, Value};
-use super::make::{Input, posterior};
+use super::make::{Input, Posterior, posterior};
 use super::moving_tests::{CASE, Case, Field};
 use crate::analysis::air_prior::Record;
 use crate::analysis::corrections::DOUBTS;
@@ -196,4 +196,51 @@ fn two_drones_that_hover_have_no_map_of_the_air() {
     };
     assert!(!has_map(1) && !has_map(2));
     assert!(has_map(3));
+}
+
+/// A fleet over which all air rises alike; the calibration's zero, in still air, is off by the doubt of a wind.
+fn rises_mps(updraft_mps: f64, doubt_mps: f64) -> Posterior {
+    let mut rng = stream(9, 1, Purpose::Sensors);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let homes_m = homes_m();
+    let windows = windows(ladder(), 0.15, |_| 0.0);
+    let mut doubts_mps = [0.0; DOUBTS];
+    doubts_mps[0] = doubt_mps;
+    let drones: Vec<Drone> = homes_m
+        .iter()
+        .map(|[x, y]| {
+            let own_mps = 0.005 * normal();
+            let value = |_| {
+                Some(Value {
+                    updraft_mps: updraft_mps + own_mps + 0.005 * normal(),
+                    law: [1.0 / SLOPE_US, 0.0, 0.0, 0.0],
+                    doubts_mps,
+                    own_mps: 0.005,
+                    noise_mps: 0.005,
+                })
+            };
+            Drone {
+                place_m: vec![[*x, *y, 60.0]],
+                calibrated_m: Some([*x, *y]),
+                values: (0..120).map(value).collect(),
+                ..Drone::default()
+            }
+        })
+        .collect();
+    let calibration = Calibration::new(&windows, &homes_m, SLOPE_US);
+    let input = Input { drones: &drones, lost_m: &[], seconds: 120, calibration, wind_mps: None };
+    posterior(&input).unwrap()
+}
+
+#[test]
+fn air_that_rises_everywhere_alike_is_within_the_map_s_interval() {
+    for (updraft_mps, doubt_mps) in [(1.0, 0.02), (-0.8, 0.02), (1.0, 0.5), (-1.0, 0.3)] {
+        let map = rises_mps(updraft_mps, doubt_mps);
+        let (mean_mps, se_mps) = map.fleet_mps.unwrap();
+        println!(
+            "{updraft_mps} {doubt_mps}: {mean_mps:.3} {se_mps:.3} {:.2}",
+            map.uniform_probability
+        );
+        assert!((mean_mps - updraft_mps).abs() < 1.96 * se_mps, "{mean_mps:.3} {se_mps:.3}");
+    }
 }

@@ -33,10 +33,14 @@ const FEWEST: usize = 24;
 /// Fewer drones than this that hover say nothing about lengths: of one or two, 1 to 80 % of the values were inside of intervals that
 /// said 95 (docs/errors.md).
 const FEWEST_DRONES: usize = 3;
-/// Probability that there is an updraft which is everywhere and always the same, before the values are seen.
-/// Over level ground there is none in the long run; slopes and waves have one. Chosen: with 0.2 this possibility alone made
+/// Probability that there is an updraft which is everywhere and always the same, before the values are seen, in air that
+/// moves. Over level ground there is none in the long run. Chosen: with 0.2 this possibility alone made
 /// the stated error of a field with known scales and gusts a fifth larger (docs/errors.md).
 const UNIFORM_SHARE: f64 = 0.05;
+/// The same in air that is still otherwise, which slopes, waves and fans make: there is no other updraft. Chosen.
+const UNIFORM_SHARE_STILL: f64 = 0.8;
+/// Air that moves by this is between the two, m/s. Chosen.
+const STILL_MPS: f64 = 0.2;
 /// A drone's constant in the search for scales, besides what its calibration says, m/s: what air in the calibration
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
@@ -208,14 +212,15 @@ fn mapped(
     let mut predicted = Predicted::of(&model, &values.rows, &sites);
     if !thermals.is_empty() {
         let components = components(&air);
-        let (at_best, ..) = mixed(std::iter::once((1.0, &choices(&system, &components)[..])))?;
+        let (at_best, ..) =
+            mixed(std::iter::once((1.0, &choices(&system, &components, &air)[..])))?;
         predicted.add(&thermals, &values.rows, input.drones, &sites);
         // The whole map changes with a thermal's numbers: by one standard error in each independent direction.
         for aside in asides(&thermals) {
             let drones = less(input.drones, &aside);
             let rows = Rows::of(&drones, values.first, STEP);
             let system = Search { rows: &rows, ..search }.system(found.family, &found.best)?;
-            let choices = choices(&system, &components);
+            let choices = choices(&system, &components, &air);
             let (there, ..) = mixed(std::iter::once((1.0, &choices[..])))?;
             let linear = linear(&system, mean + there - at_best, &covariance);
             let model = Model { drones: &drones, covariance: covariance_of_air, linear };
@@ -261,7 +266,8 @@ pub(super) fn sampled(
     let search = Search { own_mps: &own_mps, ..*search };
     samples(found, |point| {
         let system = search.system(found.family, point)?;
-        let choices = choices(&system, &components(&search.air(found.family, point)));
+        let air = search.air(found.family, point);
+        let choices = choices(&system, &components(&air), &air);
         let log_likelihood = log_sum(choices.iter().map(|choice| choice.log_weight));
         Some((log_likelihood + log_prior(point), choices))
     })
@@ -290,13 +296,20 @@ pub(super) fn prior_factor(component: Option<&Component>, is_uniform: bool) -> C
     prior
 }
 
+/// See [`UNIFORM_SHARE`].
+fn uniform_share(air: &Air) -> f64 {
+    let moves = air.sd_mps.hypot(air.slow_mps).hypot(air.gust_mps) / STILL_MPS;
+    UNIFORM_SHARE + (UNIFORM_SHARE_STILL - UNIFORM_SHARE) / (1.0 + moves.powi(4))
+}
+
 /// All choices of the calibration's air and of a uniform updraft, for one choice of the scales.
-fn choices(system: &System, components: &[Component]) -> Vec<Choice> {
+fn choices(system: &System, components: &[Component], air: &Air) -> Vec<Choice> {
+    let uniform_share = uniform_share(air);
     let mut found = Vec::new();
     for component in components {
         let mut mean = CommonVector::zeros();
         mean.iter_mut().zip(component.shift).for_each(|(mean, shift)| *mean = shift);
-        for (is_uniform, share) in [(false, 1.0 - UNIFORM_SHARE), (true, UNIFORM_SHARE)] {
+        for (is_uniform, share) in [(false, 1.0 - uniform_share), (true, uniform_share)] {
             let Some(solved) = system.posterior(&mean, &prior_factor(Some(component), is_uniform))
             else {
                 continue;
@@ -373,7 +386,10 @@ fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
         let squares: f64 = beyond().map(|(weight, value)| weight * (value - mean).powi(2)).sum();
         if weight > 0.0 { (squares / weight).sqrt() } else { 0.0 }
     };
-    let interval = [mean - NORMAL * side(-1.0), mean + NORMAL * side(1.0)];
+    let [below, above] = [side(-1.0), side(1.0)];
+    // Where one point has all the weight there is none to one side.
+    let or = |own: f64, other: f64| if own > 0.0 { own } else { other };
+    let interval = [mean - NORMAL * or(below, above), mean + NORMAL * or(above, below)];
     Scale { value: mean.exp(), interval: interval.map(f64::exp) }
 }
 

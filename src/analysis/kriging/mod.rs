@@ -34,6 +34,7 @@ mod sampling;
 mod scales;
 #[cfg(test)]
 mod scales_tests;
+mod scatter;
 mod thermals;
 #[cfg(test)]
 mod thousands_tests;

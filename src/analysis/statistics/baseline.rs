@@ -115,6 +115,11 @@ fn sentence(found: &Baseline) -> String {
     if let Some(fleet) = &found.fleet {
         let _ = write!(text, "; the mean of all drones needs {}", of(fleet));
     }
+    let _ = write!(
+        text,
+        "; air that is slower than this record of {:.0} s is not in it",
+        found.record_s
+    );
     text
 }
 
