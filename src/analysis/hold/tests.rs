@@ -6,6 +6,7 @@ use rand_pcg::Pcg64;
 use super::super::corrections::DOUBTS;
 use super::points::{Point, average, common};
 use super::shift::{Flights, Shift, shift};
+use super::{MOST_STEEPER, slope_of};
 use crate::base::rng::{Purpose as Stream, stream};
 
 /// What the air and the noise of a ladder are.
@@ -134,4 +135,42 @@ fn averages_are_of_the_windows_that_all_drones_have() {
     assert_eq!(averaged.len(), one.len() - 1);
     assert!((averaged[0].pulse_us - one[0].pulse_us - 2.0).abs() < 1e-9);
     assert!((averaged[0].noise_us - CALM.noise_us / 2_f64.sqrt()).abs() < 1e-12);
+}
+
+fn leg(velocity_mps: f64, pulse_us: f64) -> Point {
+    Point {
+        key: (0, 0, 0),
+        is_leg: true,
+        time_s: 0.0,
+        velocity_mps,
+        pulse_us,
+        noise_us: 0.1,
+        velocity_noise_mps: 0.0,
+        axial_mps: 0.0,
+        doubts_us: [0.0; DOUBTS],
+    }
+}
+
+#[test]
+fn a_line_through_legs_has_their_slope() {
+    let legs: Vec<Point> = [-2.0, -1.0, 1.0, 2.0].map(|v| leg(v, 1500.0 + 25.0 * v)).into();
+    assert!((slope_of(&legs).unwrap() - 25.0).abs() < 1e-9);
+    assert!(slope_of(&legs[..2]).is_none());
+    assert!(slope_of(&[leg(1.0, 1.0); 3]).is_none());
+}
+
+#[test]
+fn a_square_law_in_an_updraft_is_not_another_vehicle() {
+    let slope = |w_mps: f64| {
+        let of = |v: f64| leg(v, 8.0 * (v - w_mps) * (v - w_mps).abs());
+        let legs: Vec<Point> = (1..=7)
+            .flat_map(|rung| [0.5, -0.5].map(|step| step * f64::from(rung)))
+            .map(of)
+            .collect();
+        slope_of(&legs).unwrap()
+    };
+    for w_mps in [-2.0, -1.0, 1.0, 2.0] {
+        let steeper = slope(w_mps) / slope(0.0);
+        assert!((1.0..0.9 * MOST_STEEPER).contains(&steeper), "{w_mps}: {steeper}");
+    }
 }

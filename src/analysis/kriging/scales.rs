@@ -48,12 +48,6 @@ pub(super) const PRIOR: [(f64, f64); SCALES] = [
     (-3.9, 0.7),
 ];
 
-/// Probability that a field is one of the usual air near the ground, and mean and standard deviation of the logarithm of its
-/// strength there: 0.45 m/s, within 0.14 and 1.5. A wind of 5 to 10 m/s over grass has 1.25 friction velocities, 0.3 to 0.6 m/s
-/// (Panofsky and Dutton 1984), the lowest 50 m of convection 0.4 to 1 m/s (Lenschow, Wyngaard and Pennell 1980). A hover of
-/// minutes in a field that is longer than the fleet is wide shows that it changes slowly, and hardly whether it is weak or slow.
-const USUAL: (f64, (f64, f64)) = (0.8, (-0.8, 0.6));
-
 /// The updraft that is everywhere the same, before the values are seen: standard deviation, m/s. Slopes, waves and fans; chosen.
 pub(super) const UNIFORM_MPS: f64 = 1.5;
 /// The mean of all values where scales are looked for, whose likelihood is to know nothing of it: standard deviation, m/s.
@@ -434,12 +428,8 @@ fn keep_probable(tops: &mut Vec<Top>, nats: f64) {
 
 /// Logarithm of the prior, but for a constant.
 pub(super) fn log_prior(point: &Point) -> f64 {
-    let normal = |at: f64, (mean, sd): (f64, f64)| -0.5 * ((at - mean) / sd).powi(2);
-    let each = point.iter().zip(PRIOR).map(|(value, prior)| normal(*value, prior));
-    let (at, any, (share, usual)) = (point[LN_SD], PRIOR[LN_SD], USUAL);
-    let density = |prior: (f64, f64)| normal(at, prior).exp() / prior.1;
-    let strength = share * density(usual) + (1.0 - share) * density(any);
-    each.sum::<f64>() - normal(at, any) + strength.ln()
+    let each = point.iter().zip(PRIOR).map(|(value, (mean, sd))| ((value - mean) / sd).powi(2));
+    -0.5 * each.sum::<f64>()
 }
 
 /// How far a point is outside of what is looked at, standard deviations of the prior.

@@ -171,6 +171,8 @@ pub enum Undetermined {
 
 /// An interval over more than this factor determines nothing. Chosen.
 const WIDEST: f64 = 100.0;
+/// An estimate so many times beyond the end of its own interval reads nothing: its curve was fitted to another scale. Chosen.
+const FARTHEST: f64 = 2.0;
 /// A lower end this close below the estimate bounds it, as a factor. Chosen.
 const BOUNDED: f64 = 10.0;
 
@@ -179,8 +181,11 @@ impl Scale {
     pub(super) fn judged(mut self) -> Self {
         let no_fit = self.fit_se.is_some_and(|se| se.is_nan() || se >= self.value.abs());
         let wide = self.interval_95.filter(|of| of.low <= 0.0 || of.high > WIDEST * of.low);
+        let far = self
+            .interval_95
+            .is_some_and(|of| self.value * FARTHEST < of.low || self.value > FARTHEST * of.high);
         self.undetermined = match wide {
-            _ if no_fit => Some(Undetermined::Unknown),
+            _ if no_fit || far => Some(Undetermined::Unknown),
             Some(of) if of.low > 0.0 && self.value < BOUNDED * of.low => Some(Undetermined::Longer),
             Some(of) if self.value > of.high / BOUNDED => Some(Undetermined::Shorter),
             Some(_) => Some(Undetermined::Unknown),

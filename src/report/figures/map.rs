@@ -274,7 +274,8 @@ pub(in crate::report) fn mean_map(
         }
         (Means::Posterior, _) => (
             ", as all drones, seconds and the calibration together tell it",
-            " Dotted frames are drones without values of their own, whose air their neighbours tell.",
+            " Dotted frames are drones without values of their own, whose air their neighbours tell: \
+             updraft.csv among the fields has its standard error for each second.",
         ),
     };
     Some(Figure {
