@@ -1,4 +1,4 @@
-//! What the scatter of the drones' constants says of the air that each met alone in its calibration.
+//! Scatter of the drones' constants: a bound on the air that each met alone in its calibration.
 //!
 //! Air that stays for a calibration and differs from drone to drone is in their constants. Where drones' constants differ
 //! less than such air would make them, there was none: a thermal that stands in the hover says nothing of the calibration.
@@ -24,6 +24,9 @@ impl Scatter {
     /// Of constants at places, m; `None` for too few drones.
     pub(super) fn of(constants_mps: &[([f64; 2], f64)]) -> Option<Self> {
         let count = constants_mps.len();
+        if count <= FEWEST {
+            return None;
+        }
         let plane = DMatrix::from_fn(count, 3, |row, column| match column {
             0 => 1.0,
             axis => constants_mps[row].0[axis - 1],
