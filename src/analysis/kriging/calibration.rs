@@ -15,7 +15,7 @@ use crate::analysis::zero::{CellAt, Windows};
 
 /// How much stronger the air of the calibration may have been than that of the hover, with weights: hours
 /// apart the air differs by such factors. Chosen.
-const STRENGTHS: [(f64, f64); 4] = [(0.2, 0.15), (0.6, 0.15), (1.0, 0.45), (1.7, 0.25)];
+const STRENGTHS: [(f64, f64); 3] = [(0.6, 0.25), (1.0, 0.5), (1.7, 0.25)];
 /// How much longer the air is in height than on the level, with weights: turbulence is alike in all
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
