@@ -183,4 +183,8 @@ pub struct TruthCheck {
     /// That of this map at the same places and seconds, m/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_limit_rms_mps: Option<f64>,
+    /// Standard error that the best linear estimate states for the mean of its values, m/s: where `limit_rms_mps` is far above
+    /// it, the air of this flight is an unusual one. Absent as `limit_rms_mps` is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit_se_mps: Option<f64>,
 }

@@ -136,10 +136,13 @@ pub(super) fn add(
         uniform_probability: found.uniform_probability,
         truth: truth::check_posterior(&map.drones).map(|check| {
             let best = known_air(shared).and_then(|air| best(&input, &air));
-            let at_limit = best.and_then(|best| truth::at_limit(&map.drones, &places, &best));
+            let limit_se_mps = best.as_ref().map(|best| best.mean_se_mps);
+            let at_limit =
+                best.and_then(|best| truth::at_limit(&map.drones, &places, &best.values));
             TruthCheck {
                 limit_rms_mps: at_limit.map(|[limit, _]| limit),
                 at_limit_rms_mps: at_limit.map(|[_, own]| own),
+                limit_se_mps,
                 ..check
             }
         }),

@@ -168,6 +168,9 @@ fn truth(map: &UpdraftMap, posterior: &PosteriorMap) -> Vec<String> {
             fixed(limit, 3),
             fixed(own / limit, 2),
         ));
+        if let Some(se) = truth.limit_se_mps.filter(|se| usable(*se)) {
+            sentences.push(format!("That estimate knows the mean to {} m/s.", fixed(se, 3)));
+        }
     }
     sentences
 }
@@ -182,7 +185,7 @@ mod tests {
             serde_json::json!({
                 "drones": 9, "values": 900, "rms_mps": rms, "bias_mps": 0.01,
                 "rms_without_bias_mps": rms, "inside_share": 0.953, "means_inside_share": 1.0,
-                "limit_rms_mps": 0.05, "at_limit_rms_mps": 0.052,
+                "limit_rms_mps": 0.05, "at_limit_rms_mps": 0.052, "limit_se_mps": 0.047,
             })
         };
         serde_json::from_value(serde_json::json!({
@@ -218,6 +221,7 @@ mod tests {
                  95 % intervals.",
                 "At one second in ten: rms error 0.052 m/s; the best linear estimate with the true covariances has \
                  0.050 m/s: ratio 1.04.",
+                "That estimate knows the mean to 0.047 m/s.",
             ]
         );
     }

@@ -23,10 +23,18 @@ pub(in super::super) struct Best {
     pub(in super::super) updraft_mps: f64,
 }
 
+/// The best estimate with what it states of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub(in super::super) struct Limit {
+    pub(in super::super) values: Vec<Best>,
+    /// Standard error of the mean of all values, m/s.
+    pub(in super::super) mean_se_mps: f64,
+}
+
 /// The best linear estimate in air of known scales, the sum of independent parts, without a uniform updraft: one value in 10 s of each drone, or fewer.
 /// `None` where the calibration does not determine the law, and for drones that move: what the correction by lean leaves along a
 /// track has no covariance that anybody knows, and a smooth field that is known takes it for its own.
-pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>> {
+pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Limit> {
     if !input.drones.iter().all(Drone::hovers) {
         return None;
     }
@@ -67,11 +75,14 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Vec<Best>
     }
     let mean = DVector::from_fn(COMMON, |row, _| component.shift.get(row).copied().unwrap_or(0.0));
     let values = DVector::from_fn(n, |row, _| rows.list[row].value_mps) - common * mean;
-    let found = of_air * of_values.cholesky()?.solve(&values);
+    let of_values = of_values.cholesky()?;
+    let of_mean = of_air.column_mean();
+    let mean_variance = of_mean.mean() - of_mean.dot(&of_values.solve(&of_mean));
+    let found = of_air * of_values.solve(&values);
     let best = rows.list.iter().zip(found.iter()).map(|(row, value)| Best {
         drone: drone_of(row),
         second: row.spot.time_s as usize,
         updraft_mps: *value,
     });
-    Some(best.collect())
+    Some(Limit { values: best.collect(), mean_se_mps: mean_variance.max(0.0).sqrt() })
 }

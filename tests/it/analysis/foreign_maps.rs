@@ -42,6 +42,7 @@ fn flown(template: &str, side: i64, own: Override, kind: &str, seed: u64) -> [Tr
 fn the_posterior_is_near_the_best_linear_estimate() {
     let mut sums = [0.0; 4];
     let mut inside = Vec::new();
+    let mut off_squared = Vec::new();
     let first = [("field", 1701), ("gusty", 1801), ("advected", 1901)];
     // A zero counts once for all values of its campaign, and in the first two of them it is so far off that who knows
     // everything is off by 0.6 m/s as well: three campaigns say little of intervals.
@@ -59,6 +60,7 @@ fn the_posterior_is_near_the_best_linear_estimate() {
             100.0 * posterior.inside_share.unwrap(),
         );
         inside.push(posterior.inside_share.unwrap());
+        off_squared.push((limit / posterior.limit_se_mps.unwrap()).powi(2));
         if index < first.len() {
             let squares = [plain.rms_mps, limit, at_limit, posterior.rms_without_bias_mps];
             sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value * value);
@@ -72,6 +74,9 @@ fn the_posterior_is_near_the_best_linear_estimate() {
     assert!(at_limit < 1.3 * limit, "{at_limit} {limit}");
     assert!(at_limit < plain, "{at_limit} {plain}");
     assert!(inside > 0.85, "{inside}");
+    // Nearly all of its error is that of the mean: one square of a standard normal number for each campaign.
+    let off_squared = off_squared.iter().sum::<f64>() / off_squared.len() as f64;
+    assert!((0.2..3.0).contains(&off_squared), "{off_squared}");
     // Without what all drones share.
     assert!(rest < 0.08, "{rest}");
 }

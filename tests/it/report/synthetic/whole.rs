@@ -77,6 +77,7 @@ pub(crate) fn whole_campaign() -> Analysis {
         means_inside_share: Some(0.976),
         limit_rms_mps: None,
         at_limit_rms_mps: None,
+        limit_se_mps: None,
     });
     analysis
 }
