@@ -8,7 +8,7 @@ use super::bins::Bin;
 use super::gusts::{Gusts, Seen};
 use super::lean::LeanLaw;
 use crate::numeric::mean;
-use crate::numeric::{differences, minimise};
+use crate::numeric::{differences, minimise, minimise_roughly};
 
 /// Prior standard deviation of the quadratic part of the model's own lean law, as a share. 0.4 was tried and
 /// taken back when the wind got an uncertainty of its own in the search.
@@ -20,6 +20,8 @@ const LINEAR_DOUBT: f64 = 0.03;
 /// degrees per m/s. The fit has several minima: of two flights whose models were tried with a body besides a drag of
 /// the rotors, the deepest was found from nearly none in one, and from the usual ones in the other.
 const USUAL_LINEAR: [f64; 3] = [0.001, 0.01, 0.03];
+/// A search that only finds under which start the deepest bottom is ends where two steps gain less, nats. Numerical.
+const ROUGH_NATS: f64 = 0.1;
 /// Searches from where the last one ended, at most: each has only so many steps. Numerical.
 const AGAIN: usize = 3;
 /// A search that gains less was at the bottom already, nats. Numerical.
@@ -229,7 +231,9 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
         let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).air.law);
         (start[0], start[1]) = (x, y);
-        minimise(start, objective, |at, value| differences(objective, at, value))
+        let slopes = |at: &[f64; COUNT], value| differences(objective, at, value);
+        let end = minimise_roughly(start, None, ROUGH_NATS, objective, slopes);
+        (end.at, end.value)
     };
     let starts: Vec<f64> = match lacks {
         Lacks::Rotors => {

@@ -10,7 +10,7 @@ use super::super::noise::{GroupPattern, Hyper};
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
 use super::super::search::{FAR_NATS, FLOOR_NATS, FREE_FLOOR_NATS};
-use super::{Found, In, Look, MOST_GUSTS_MPS, Only, Search};
+use super::{Found, In, Look, MOST_GUSTS_MPS, Only, SAME_GUSTS_MPS, Search};
 
 impl Search<'_> {
     /// What is left in the updraft in which one effect explains the flight best: an updraft that was settled in without
@@ -56,9 +56,9 @@ impl Search<'_> {
         if self.found.updraft_mps.abs() < STILL_MPS {
             return Ok(look);
         }
-        self.found.was_in_updraft = true;
+        let was_in_updraft = std::mem::replace(&mut self.found.was_in_updraft, true);
         let there = (self.comparison.clone(), self.found.clone());
-        self.found.updraft_mps = 0.0;
+        (self.found.updraft_mps, self.found.was_in_updraft) = (0.0, was_in_updraft);
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
         let still = self.look(In::Present(Some(&look.seen.patterns)))?;
@@ -122,15 +122,14 @@ impl Search<'_> {
         }
         let starts = [&[0.0], &UPDRAFTS_MPS[..]].concat();
         let nearest = self.nearest_flight_mps(&starts);
-        let of =
-            |starts: &[f64], steps: &[f64]| self.likeliest_flight(&look.seen.start, starts, steps);
+        let of = |starts: &[f64], step| self.likeliest_flight(&look.seen.start, starts, step);
         // In calm air few hundredths of a metre per second are the likeliest, and steps from afar miss them.
-        let beside = nearest.and_then(|mps| of(&[mps], &FLIGHT_STEPS_MPS[3..]));
-        let likeliest = of(&starts, &FLIGHT_STEPS_MPS).into_iter().chain(beside);
+        let beside = nearest.and_then(|mps| of(&[mps], NEAR_STEP));
+        let likeliest = of(&starts, FAR_STEP).into_iter().chain(beside);
         let best = likeliest.reduce(|one, other| if other.0 > one.0 { other } else { one });
         let Some((_, updraft_mps)) = best else { return Ok(look) };
         let is_asked = self.options.most_steps == 0 && self.options.each_flown;
-        if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 && !is_asked {
+        if (updraft_mps - self.found.updraft_mps).abs() < SAME_FLIGHT_MPS && !is_asked {
             return Ok(look);
         }
         let before = (self.comparison.clone(), self.found.clone());
@@ -160,7 +159,7 @@ impl Search<'_> {
         }
         let hyper = if went { self.found.hyper } else { hyper };
         let start = [self.found.updraft_mps];
-        let likeliest = self.likeliest_flight(&Start::from(hyper), &start, &FLIGHT_STEPS_MPS[..3]);
+        let likeliest = self.likeliest_flight(&Start::from(hyper), &start, ROUGH_STEP);
         let elsewhere = likeliest.filter(|(_, mps)| *mps != self.found.updraft_mps);
         if let Some((_, updraft_mps)) = elsewhere
             && let Some(nats) = self.goes_to(updraft_mps, nats)?
@@ -217,14 +216,14 @@ impl Search<'_> {
     }
 
     /// How likely the flight of the present model is in the updraft in which it is likeliest, nats, and that updraft, m/s,
-    /// from the best of some starts by steps to either side; `None`: it can fly in none.
+    /// near the best of some starts; `None`: it can fly in none.
     fn likeliest_flight(
         &self,
         noise: &Start,
         starts_mps: &[f64],
-        steps_mps: &[f64],
+        step: StepMps,
     ) -> Option<(f64, f64)> {
-        most_beside(|updraft_mps| self.likely_in(updraft_mps, noise), starts_mps, steps_mps)
+        most_beside(|updraft_mps| self.likely_in(updraft_mps, noise), starts_mps, step)
     }
 
     /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
@@ -233,9 +232,9 @@ impl Search<'_> {
         let nearness = |updraft_mps: f64| {
             let there = self.flown_in(updraft_mps).ok()?;
             let is_alike = there.data.bins_of_groups() == bins;
-            there.raw_gap_us().ok().filter(|_| is_alike).map(|gap_us| -gap_us)
+            there.raw_gap_us().ok().filter(|_| is_alike).map(|gap_us| -gap_us * gap_us)
         };
-        Some(most_beside(nearness, starts_mps, &FLIGHT_STEPS_MPS[..4])?.1)
+        Some(most_beside(nearness, starts_mps, StepMps { ends_mps: 0.06, ..FAR_STEP })?.1)
     }
 
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
@@ -256,21 +255,23 @@ impl Search<'_> {
         }
         let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
         let known = doubts.get(1..).unwrap_or_default();
-        let (mut likely, mut noise, mut gusts) = (None, noise, self.found.gusts_mps);
-        for _ in 0..2 {
+        let share = updraft_mps / UPDRAFT_DOUBT_MPS;
+        let known_nats = there.lean_misfit_nats() + 0.5 * share * share;
+        let (mut noise, mut gusts) = (noise, self.found.gusts_mps);
+        // The gusts of a noise bend the model's curve, so twice.
+        for is_last in [false, true] {
             let patterns = there.patterns(vehicle, gusts).ok()?;
             let residual = Split::of(&there.residual(vehicle, gusts).ok()?);
             let problem = Problem::new(&patterns, &residual).doubting(known);
             let fit = problem.fit(noise, Likelihood::Profile);
-            let fit = settled(&problem, fit, |_| patterns.clone()).1;
-            likely = Some(fit.log_posterior());
-            noise = Start::from(&fit);
-            gusts = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
+            let next = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
+            if is_last || (next - gusts).abs() < SAME_GUSTS_MPS {
+                let likely = settled(&problem, fit, |_| patterns.clone()).1.log_posterior();
+                return likely.is_finite().then(|| likely - known_nats);
+            }
+            (noise, gusts) = (Start::from(&fit), next);
         }
-        let share = updraft_mps / UPDRAFT_DOUBT_MPS;
-        let leans_nats = there.lean_misfit_nats();
-        let known_nats = leans_nats + 0.5 * share * share;
-        likely.filter(|likely| likely.is_finite()).map(|likely| likely - known_nats)
+        None
     }
 
     /// Whether the flight may have been in another updraft. A table has the climb that was flown, not the one
@@ -374,22 +375,76 @@ impl Search<'_> {
     }
 }
 
-/// The most that something is, and where: from the best of some starts by steps to either side; `None`: it is nowhere.
+/// How the most of something is looked for beside a start, m/s.
+#[derive(Clone, Copy, Debug)]
+struct StepMps {
+    /// First step to either side.
+    begins_mps: f64,
+    /// Steps that are shorter are none.
+    ends_mps: f64,
+}
+
+/// The most that something is, and where: from the best of some starts by parabolas through the places tried so far, of
+/// which it is nearly one; `None`: it is nowhere.
 fn most_beside(
     of: impl Fn(f64) -> Option<f64> + Sync,
-    starts: &[f64],
-    steps: &[f64],
+    starts_mps: &[f64],
+    StepMps { begins_mps, ends_mps }: StepMps,
 ) -> Option<(f64, f64)> {
-    let best_of = |places: &[f64]| {
-        let each = places.par_iter().filter_map(|place| Some((of(*place)?, *place)));
-        each.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+    let all = |places: &[f64]| -> Vec<(f64, f64)> {
+        let each = places.par_iter().map(|place| (of(*place).unwrap_or(NOWHERE), *place));
+        each.collect()
     };
-    let mut best = best_of(starts)?;
-    for step in steps {
-        let beside = best_of(&[best.1 - step, best.1 + step]);
-        best = beside.filter(|beside| beside.0 > best.0).unwrap_or(best);
+    let mut tried = all(starts_mps);
+    for _ in 0..PARABOLAS {
+        let best = most_of(&tried)?;
+        let side = |sign: f64| {
+            let beyond = tried.iter().filter(|one| sign * (one.1 - best.1) > 0.0);
+            beyond.min_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1))).copied()
+        };
+        let next = match (side(-1.0), side(1.0)) {
+            (Some(below), Some(above)) => {
+                let place = beside_top([below, best, above]);
+                let is_new =
+                    [below, best, above].iter().all(|one| (one.1 - place).abs() >= 0.5 * ends_mps);
+                if !is_new {
+                    break;
+                }
+                vec![place]
+            }
+            (below, above) => {
+                let sides = [(below, -begins_mps), (above, begins_mps)];
+                let open = sides.into_iter().filter(|(known, _)| known.is_none());
+                open.map(|(_, step_mps)| best.1 + step_mps).collect()
+            }
+        };
+        tried.extend(all(&next));
     }
-    Some(best)
+    most_of(&tried)
+}
+
+/// The most of what was tried, where it was anything.
+fn most_of(tried: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let somewhere = tried.iter().copied().filter(|one| one.0 > NOWHERE);
+    somewhere.reduce(|one, other| if other.0 > one.0 { other } else { one })
+}
+
+/// Where a parabola through three places, the middle one with the most, has its top; between the outer ones, and not at either of
+/// them.
+fn beside_top([below, best, above]: [(f64, f64); 3]) -> f64 {
+    let [back, ahead] = [best.1 - below.1, above.1 - best.1];
+    let [fallen, falls] = [best.0 - below.0, best.0 - above.0];
+    if !(fallen + falls).is_finite() {
+        // Nothing flies on one side: halfway to it.
+        return if fallen.is_finite() { best.1 + 0.5 * ahead } else { best.1 - 0.5 * back };
+    }
+    let steep = fallen * ahead + falls * back;
+    let top = if steep > 0.0 {
+        0.5 * (fallen * ahead * ahead - falls * back * back) / steep
+    } else {
+        0.0
+    };
+    best.1 + top.clamp(-0.8 * back, 0.8 * ahead)
 }
 
 /// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the
@@ -499,9 +554,18 @@ const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
-/// Steps to either side by which the updraft of the likeliest flight is found, m/s: by halves, down to half of what a
-/// flight tells of it at best. Numerical.
-const FLIGHT_STEPS_MPS: [f64; 5] = [0.5, 0.25, 0.12, 0.06, 0.03];
+/// How the updraft of the likeliest flight is found: down to half of what a flight tells of it at best. Numerical.
+const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03 };
+/// The same with what was found already, which keeps a search from going far.
+const ROUGH_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.12 };
+/// The same where the model itself is nearest.
+const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03 };
+/// Places by parabolas, at most. Numerical.
+const PARABOLAS: usize = 6;
+/// What cannot be flown is as unlikely as this.
+const NOWHERE: f64 = f64::NEG_INFINITY;
+/// The likeliest flight in an updraft this near to that of a search is no other, m/s. Chosen: from there its own steps lead on.
+const SAME_FLIGHT_MPS: f64 = 0.25;
 /// A raw gap that is larger by this factor is that of a model in the wrong updraft. Chosen: the air that all drones share
 /// makes more or less of it by chance.
 const NEAR: f64 = 1.1;
@@ -578,10 +642,10 @@ mod tests {
     #[test]
     fn the_most_is_climbed_to_from_the_best_of_the_starts() {
         let hill = |place: f64| (place > -2.0).then_some(-(place - 1.3).abs());
-        let near =
-            |starts: &[f64]| most_beside(hill, starts, &[0.5, 0.25, 0.12]).map(|best| best.1);
-        assert_eq!(near(&[0.0, -1.0, 1.0]), Some(1.25));
-        assert_eq!(near(&[-1.5]), Some(-1.5 + 0.5 + 0.25 + 0.12));
+        let near = |starts: &[f64]| most_beside(hill, starts, FAR_STEP).map(|best| best.1);
+        let found = |starts: &[f64]| near(starts).map(|place| (10.0 * place).round() / 10.0);
+        assert_eq!(found(&[0.0, -1.0, 1.0]), Some(1.3));
+        assert_eq!(found(&[0.6]), Some(1.3));
         assert_eq!(near(&[-3.0]), None);
     }
 }
