@@ -7,8 +7,12 @@ use rayon::prelude::*;
 use super::bins::Bin;
 use super::gusts::{Gusts, Seen};
 use super::lean::LeanLaw;
+use super::memory::{Digest, Memory};
 use crate::numeric::mean;
 use crate::numeric::{differences, minimise, minimise_roughly};
+
+/// Laws that were fitted: the wind of a comparison is read until it stays, and then once more with all that it tells.
+static FITTED: Memory<Fitted> = Memory::of(1_000);
 
 /// Prior standard deviation of the quadratic part of the model's own lean law, as a share. 0.4 was tried and
 /// taken back when the wind got an uncertainty of its own in the search.
@@ -131,6 +135,16 @@ pub(super) struct Fitted {
 /// Fits the law from the model's. The search starts from the model's own linear part and from what small
 /// rotors usually have: with too small a one the wind begins far too strong.
 pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
+    let mut digest = Digest::new();
+    digest.add_debug(&(&points, model));
+    FITTED.get(digest).unwrap_or_else(|| {
+        let fitted = fitted(points, model);
+        FITTED.keep(digest, fitted);
+        fitted
+    })
+}
+
+fn fitted(points: Vec<Point>, model: LeanLaw) -> Fitted {
     let leans = Leans::of(points);
     let model = usable(model);
     let (at, misfit_nats) = most_probable(&leans, model, Lacks::Rotors);

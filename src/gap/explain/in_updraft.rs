@@ -9,7 +9,7 @@ use super::super::model_flights::View;
 use super::super::noise::{GroupPattern, Hyper};
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
-use super::super::search::{FAR_NATS, FLOOR_NATS, FREE_FLOOR_NATS};
+use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
 use super::{Found, In, Look, MOST_GUSTS_MPS, Only, SAME_GUSTS_MPS, Search};
 
 impl Search<'_> {
@@ -154,13 +154,15 @@ impl Search<'_> {
         let nats = self.climbs(before_nats)?;
         let went = nats > before_nats;
         let beaten_nats = self.options.only.map_or(f64::NEG_INFINITY, |only| only.beaten_nats);
-        if nats < beaten_nats - FAR_NATS {
+        if nats < beaten_nats - BEATEN_NATS {
             return Ok(went);
         }
-        let hyper = if went { self.found.hyper } else { hyper };
-        let start = [self.found.updraft_mps];
-        let likeliest = self.likeliest_flight(&Start::from(hyper), &start, ROUGH_STEP);
-        let elsewhere = likeliest.filter(|(_, mps)| *mps != self.found.updraft_mps);
+        let noise = Start::from(if went { self.found.hyper } else { hyper });
+        let of = |updraft_mps: f64| self.likely_in(updraft_mps, &noise);
+        let here = all_of(of, &[self.found.updraft_mps]);
+        let here_nats = here.first().map_or(NOWHERE, |here| here.0);
+        let likeliest = most_beside(of, here, ROUGH_STEP);
+        let elsewhere = likeliest.filter(|(nats, _)| *nats > here_nats + SAME_FLIGHT_NATS);
         if let Some((_, updraft_mps)) = elsewhere
             && let Some(nats) = self.goes_to(updraft_mps, nats)?
         {
@@ -223,7 +225,8 @@ impl Search<'_> {
         starts_mps: &[f64],
         step: StepMps,
     ) -> Option<(f64, f64)> {
-        most_beside(|updraft_mps| self.likely_in(updraft_mps, noise), starts_mps, step)
+        let of = |updraft_mps: f64| self.likely_in(updraft_mps, noise);
+        most_beside(of, all_of(of, starts_mps), step)
     }
 
     /// The updraft in which the present model, flown, is nearest to the logs, m/s, from the best of some starts.
@@ -234,7 +237,8 @@ impl Search<'_> {
             let is_alike = there.data.bins_of_groups() == bins;
             there.raw_gap_us().ok().filter(|_| is_alike).map(|gap_us| -gap_us * gap_us)
         };
-        Some(most_beside(nearness, starts_mps, StepMps { ends_mps: 0.06, ..FAR_STEP })?.1)
+        let step = StepMps { ends_mps: 0.06, ..FAR_STEP };
+        Some(most_beside(nearness, all_of(nearness, starts_mps), step)?.1)
     }
 
     /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
@@ -384,18 +388,18 @@ struct StepMps {
     ends_mps: f64,
 }
 
-/// The most that something is, and where: from the best of some starts by parabolas through the places tried so far, of
-/// which it is nearly one; `None`: it is nowhere.
+/// How much something is at some places.
+fn all_of(of: impl Fn(f64) -> Option<f64> + Sync, places: &[f64]) -> Vec<(f64, f64)> {
+    places.par_iter().map(|place| (of(*place).unwrap_or(NOWHERE), *place)).collect()
+}
+
+/// The most that something is, and where: from the best of the places that were tried by parabolas through them, of which it
+/// is nearly one; `None`: it is nowhere.
 fn most_beside(
     of: impl Fn(f64) -> Option<f64> + Sync,
-    starts_mps: &[f64],
+    mut tried: Vec<(f64, f64)>,
     StepMps { begins_mps, ends_mps }: StepMps,
 ) -> Option<(f64, f64)> {
-    let all = |places: &[f64]| -> Vec<(f64, f64)> {
-        let each = places.par_iter().map(|place| (of(*place).unwrap_or(NOWHERE), *place));
-        each.collect()
-    };
-    let mut tried = all(starts_mps);
     for _ in 0..PARABOLAS {
         let best = most_of(&tried)?;
         let side = |sign: f64| {
@@ -418,7 +422,7 @@ fn most_beside(
                 open.map(|(_, step_mps)| best.1 + step_mps).collect()
             }
         };
-        tried.extend(all(&next));
+        tried.extend(all_of(&of, &next));
     }
     most_of(&tried)
 }
@@ -564,6 +568,11 @@ const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03 };
 const PARABOLAS: usize = 6;
 /// What cannot be flown is as unlikely as this.
 const NOWHERE: f64 = f64::NEG_INFINITY;
+/// A flight that is less likely than what was found by this much is not looked for elsewhere, nats. Chosen: of 14 that were, none
+/// gained more than 10.
+const BEATEN_NATS: f64 = 40.0;
+/// A flight elsewhere that is likelier by less is the same, nats.
+const SAME_FLIGHT_NATS: f64 = 1.0;
 /// The likeliest flight in an updraft this near to that of a search is no other, m/s. Chosen: from there its own steps lead on.
 const SAME_FLIGHT_MPS: f64 = 0.25;
 /// A raw gap that is larger by this factor is that of a model in the wrong updraft. Chosen: the air that all drones share
@@ -642,7 +651,8 @@ mod tests {
     #[test]
     fn the_most_is_climbed_to_from_the_best_of_the_starts() {
         let hill = |place: f64| (place > -2.0).then_some(-(place - 1.3).abs());
-        let near = |starts: &[f64]| most_beside(hill, starts, FAR_STEP).map(|best| best.1);
+        let near =
+            |starts: &[f64]| most_beside(hill, all_of(hill, starts), FAR_STEP).map(|best| best.1);
         let found = |starts: &[f64]| near(starts).map(|place| (10.0 * place).round() / 10.0);
         assert_eq!(found(&[0.0, -1.0, 1.0]), Some(1.3));
         assert_eq!(found(&[0.6]), Some(1.3));
