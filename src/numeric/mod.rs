@@ -30,5 +30,6 @@ pub use line::Line;
 pub(crate) use minimise::{
     Inverse, Least, differences, minimise, minimise_known, minimise_roughly,
 };
+pub(crate) use moments::log_sum;
 pub use moments::{Moments, mean, rms};
 pub use order::{Sorted, extent, least, median, most, upper_median};

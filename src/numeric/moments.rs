@@ -18,6 +18,16 @@ pub fn rms<V: Borrow<f64>>(values: impl IntoIterator<Item = V>) -> Option<f64> {
     mean(values.into_iter().map(|value| value.borrow() * value.borrow())).map(f64::sqrt)
 }
 
+/// Logarithm of the sum of numbers that are given by their logarithms; negative infinity of nothing.
+pub(crate) fn log_sum(logs: impl IntoIterator<Item = f64, IntoIter: Clone>) -> f64 {
+    let logs = logs.into_iter();
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
+    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
+}
+
 /// Number, mean and scatter of values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {
@@ -69,6 +79,14 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_logarithm_of_a_sum_is_that_of_numbers_too_small_to_add() {
+        assert!((log_sum([2.0_f64.ln(), 3.0_f64.ln()]) - 5.0_f64.ln()).abs() < 1e-12);
+        assert!((log_sum([-9000.0, -9000.0]) - (2.0_f64.ln() - 9000.0)).abs() < 1e-9);
+        assert_eq!(log_sum([]), f64::NEG_INFINITY);
+        assert_eq!(log_sum([f64::NEG_INFINITY; 2]), f64::NEG_INFINITY);
+    }
 
     #[test]
     fn nothing_has_no_mean() {

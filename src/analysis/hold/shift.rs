@@ -12,7 +12,7 @@ use super::super::air_prior::Air;
 use super::super::corrections::{DOUBTS, DRIFT, WINDS};
 use super::curve::{LENGTHS_MPS, RESTS_US, Rest, basis, bent, beyond_us};
 use super::points::Point;
-use crate::numeric::{extent, mean};
+use crate::numeric::{extent, log_sum, mean};
 
 /// `W` is searched to this on both sides, m/s: the range of the laws' fits.
 pub(super) const FASTEST_MPS: f64 = 8.0;
@@ -79,7 +79,7 @@ pub(super) fn shift(flights: &Flights<'_>) -> Option<Shift> {
         let logs = choices
             .iter()
             .filter_map(|choice| Some(choice.weight.ln() + model.density(choice, &airs, w_mps)?));
-        log_sum(&logs.collect::<Vec<f64>>())
+        some_log_sum(logs.collect())
     };
     let mut nodes: Vec<(f64, f64)> = coarse
         .iter()
@@ -139,11 +139,9 @@ fn top(coarse: &[(f64, f64)], density: impl Fn(f64) -> Option<(f64, f64)>) -> Op
     Some(best.0)
 }
 
-/// Logarithm of the sum of what has these logarithms.
-fn log_sum(logs: &[f64]) -> Option<f64> {
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let sum = logs.iter().map(|log| (log - most).exp()).sum::<f64>();
-    most.is_finite().then(|| most + sum.ln())
+/// `None` of nothing that is possible.
+fn some_log_sum(logs: Vec<f64>) -> Option<f64> {
+    Some(log_sum(logs)).filter(|log| log.is_finite())
 }
 
 fn by_place(left: &(f64, f64), right: &(f64, f64)) -> Ordering {
@@ -390,7 +388,7 @@ impl<'a> Model<'a> {
             let log = log_density(&factor, &residual, &factor.solve(&residual)) + prior;
             log.is_finite().then_some(log)
         };
-        log_sum(&airs.iter().filter_map(one).collect::<Vec<f64>>())
+        some_log_sum(airs.iter().filter_map(one).collect())
     }
 
     /// Chi² of the ladder at `W`, in the calibration's air.

@@ -20,7 +20,7 @@ use super::vecchia::{Common, CommonVector, Posterior as Solved, System, innovati
 use crate::analysis::corrections::DOUBTS;
 use crate::analysis::running::RUNNING_S;
 use crate::analysis::shape::PARAMETERS;
-use crate::numeric::rms;
+use crate::numeric::{log_sum, rms};
 
 /// Seconds between rows, which share none.
 const STEP: usize = RUNNING_S as usize;
@@ -321,12 +321,6 @@ fn choices(system: &System, components: &[Component], air: &Air) -> Vec<Choice> 
         }
     }
     found
-}
-
-/// Logarithm of a sum of exponentials.
-fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
-    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
-    most + logs.map(|log| (log - most).exp()).sum::<f64>().ln()
 }
 
 /// Mean and covariance of the common errors over all choices, and the weight of a uniform updraft.

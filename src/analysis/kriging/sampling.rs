@@ -9,6 +9,7 @@ use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::scales::{Axis, Found, Point, SCALES};
+use crate::numeric::log_sum;
 
 /// Points of a round.
 const POINTS: usize = 48;
@@ -105,8 +106,7 @@ impl Proposal<'_> {
                 let at = |wide: f64| -0.5 * square / (wide * wide) - SCALES as f64 * wide.ln();
                 let near = (1.0 - FAR_SHARE).ln() + at(wider);
                 let far = FAR_SHARE.ln() + at(FAR * wider);
-                let most = near.max(far);
-                most + ((near - most).exp() + (far - most).exp()).ln() - ln_sd
+                log_sum([near, far]) - ln_sd
             }
         }
     }
@@ -156,9 +156,7 @@ fn reweigh<T>(drawn: &mut [Drawn<T>], proposals: &[Proposal<'_>]) -> f64 {
     for one in drawn.iter_mut() {
         let densities: Vec<f64> =
             proposals.iter().map(|proposal| proposal.ln_density(&one.point)).collect();
-        let most = densities.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = densities.iter().map(|density| (density - most).exp()).sum();
-        one.weight = one.ln_posterior - most - (sum / proposals.len() as f64).ln();
+        one.weight = one.ln_posterior - log_sum(densities) + (proposals.len() as f64).ln();
     }
     let most = drawn.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
     for one in drawn.iter_mut() {

@@ -5,6 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::numeric::log_sum;
+
 /// How far the constants of drones of one make may lie apart without any air, m/s, each as likely as the others: masses and
 /// rotors that differ by 0.1 to 3 %. A grid.
 const SPREADS_MPS: [f64; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
@@ -44,12 +46,10 @@ impl Scatter {
     /// Logarithm of the likelihood, but for a constant, where air adds so much to the variance of the drones' own
     /// constants, (m/s)².
     pub(super) fn ln_likelihood(&self, by_air: f64) -> f64 {
-        let logs = SPREADS_MPS.map(|spread| {
+        log_sum(SPREADS_MPS.map(|spread| {
             let variance = spread * spread + by_air.max(0.0);
             -0.5 * self.freedom * (variance.ln() + self.variance / variance)
-        });
-        let most = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        most + logs.into_iter().map(|log| (log - most).exp()).sum::<f64>().ln()
+        }))
     }
 }
 
