@@ -98,8 +98,9 @@ pub(super) fn fewer_instead(
 const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 
 /// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
-/// strong wind that was read without a drag, what nobody knows of that wind hides the drag; and a shape of the climb that could
-/// not be taken in may be an effect in another updraft. `flown` searches with these options.
+/// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag explains
+/// enough to be named and moves the pulse by too little; and a shape of the climb that could
+/// not be taken in may be an effect in another updraft. `flown` searches with these options, and `rest` looks for what is left.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
@@ -107,12 +108,15 @@ pub(super) fn effect_after_all(
     found: Found,
     options: &Options,
     flown: impl Fn(&Options) -> Result<Searched, GapError> + Sync,
+    rest: impl FnOnce(&Options, Left) -> Result<Found, GapError>,
 ) -> Result<Found, GapError> {
-    let Found { comparison, rest, .. } = &found;
+    let Found { comparison, rest: end, .. } = &found;
     let wind = &comparison.wind;
-    let is_misread = wind.measured.is_none() && is_strong_wind(wind.mean_mps);
-    let is_left = rest.gain_nats > rest.threshold_nats
-        && Dependence::of(&rest.candidate) == Some(Dependence::Climb);
+    let passes = end.gain_nats > end.threshold_nats;
+    let reads_wind = WIND_READERS.iter().any(|role| role.is_of(&end.candidate));
+    let is_misread =
+        wind.measured.is_none() && (is_strong_wind(wind.mean_mps) || passes && reads_wind);
+    let is_left = passes && Dependence::of(&end.candidate) == Some(Dependence::Climb);
     if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
         return Ok(found);
     }
@@ -128,7 +132,13 @@ pub(super) fn effect_after_all(
     };
     let better = effects.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
     let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
-    Ok(best.map_or(found, |best| best.found))
+    match best {
+        Some(Ended { only: Some(only), left: Some(left), .. }) => {
+            rest(&Options { rest: true, ..alone(options, only) }, left)
+        }
+        Some(best) => Ok(best.found),
+        None => Ok(found),
+    }
 }
 
 /// Options of a search for one effect alone.
@@ -489,24 +499,34 @@ mod tests {
     fn a_drag_by_which_a_strong_wind_was_misread_stands_in_place_of_nothing() {
         let data = trial::data(2, |_, _| 0.0);
         // As rare as an updraft is, so much less is explained with nothing.
-        let told = |updraft_mps: f64, wind_mps: f64, options: &Options| {
+        let told = |updraft_mps: f64, wind_mps: f64, left: (&str, f64), options: &Options| {
             let mut nothing = Found::nothing(trial::comparison(&data));
             nothing.updraft_mps = updraft_mps;
             nothing.comparison.wind.mean_mps = [wind_mps, 0.0];
+            let (candidate, gain_nats) = (left.0.to_owned(), left.1);
+            nothing.rest = Rest { candidate, gain_nats, threshold_nats: 8.0, ..Rest::default() };
             let flown = |options: &Options| {
                 let mut there = Found::nothing(trial::comparison(&data));
                 there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
                 Ok(Searched { found: there, left: None })
             };
-            let there = effect_after_all(nothing, options, flown).unwrap();
+            let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
+            let there = effect_after_all(nothing, options, flown, none_left).unwrap();
             !there.steps.is_empty()
         };
         let options = Options::default();
-        assert!(told(20.0, 9.0, &options));
-        assert!(!told(20.0, 5.0, &options), "nothing hides it");
-        assert!(!told(15.0, 9.0, &options), "nothing explains nearly as much");
+        let none = ("", 0.0);
+        assert!(told(20.0, 9.0, none, &options));
+        assert!(!told(20.0, 5.0, none, &options), "nothing hides it");
+        assert!(!told(15.0, 9.0, none, &options), "nothing explains nearly as much");
         let still_air = Options { updraft: false, ..options };
-        assert!(!told(20.0, 9.0, &still_air), "a table is not flown again");
+        assert!(!told(20.0, 9.0, none, &still_air), "a table is not flown again");
+        assert!(
+            told(20.0, 5.0, ("parasitic-drag", 9.3), &options),
+            "by the drag the wind is weaker"
+        );
+        assert!(!told(20.0, 5.0, ("parasitic-drag", 7.0), &options), "chance explains as much");
+        assert!(!told(20.0, 5.0, ("battery", 9.3), &options), "nobody reads a wind by it");
     }
 
     #[test]
@@ -521,7 +541,8 @@ mod tests {
                 asked.lock().unwrap().push(options.only.unwrap().effect);
                 Ok(Searched { found: Found::nothing(trial::comparison(&data)), left: None })
             };
-            let there = effect_after_all(nothing, &Options::default(), flown).unwrap();
+            let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
+            let there = effect_after_all(nothing, &Options::default(), flown, none_left).unwrap();
             assert!(there.steps.is_empty(), "none of them was found");
             asked.into_inner().unwrap()
         };

@@ -75,7 +75,9 @@ impl Question<'_> {
         }
         let setting = self.setting(train);
         if found.steps.is_empty() {
-            found = effect_after_all(found, self.options, |options| setting.search(options))?;
+            let flown = |options: &Options| setting.search(options);
+            let rest = |options: &Options, left| setting.look_for_rest(options, left);
+            found = effect_after_all(found, self.options, flown, rest)?;
             if !found.steps.is_empty() {
                 gap = self.case(&found).gap(train, held)?;
             }
