@@ -271,7 +271,7 @@ impl Search<'_> {
             let next = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
             if is_last || (next - gusts).abs() < SAME_GUSTS_MPS {
                 let likely = settled(&problem, fit, |_| patterns.clone()).1.log_posterior();
-                return likely.is_finite().then(|| likely - known_nats);
+                return likely.is_finite().then_some(likely - known_nats);
             }
             (noise, gusts) = (Start::from(&fit), next);
         }
