@@ -257,6 +257,6 @@ fn a_clock_that_is_shared_waits_for_the_fleet_from_the_first_instant() {
         running.now() - before
     };
     let (went_on, _) = serve(Vec::new(), &options, &clock, body).unwrap();
-    // The fleet tells the time once in a round.
-    assert!((9 * S..11 * S).contains(&went_on), "{went_on}");
+    // The fleet tells the time at the end of a round of 20 ms: what was told before can be that old.
+    assert!((9 * S..=10 * S + S / 25).contains(&went_on), "{went_on}");
 }
