@@ -142,7 +142,7 @@ pub(super) fn add(
             TruthCheck {
                 limit_rms_mps: at_limit.map(|[limit, _]| limit),
                 at_limit_rms_mps: at_limit.map(|[_, own]| own),
-                limit_se_mps,
+                limit_se_mps: at_limit.and(limit_se_mps),
                 ..check
             }
         }),

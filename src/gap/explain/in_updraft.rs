@@ -560,7 +560,7 @@ const STILL_MPS: f64 = 0.05;
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
 /// How the updraft of the likeliest flight is found: down to half of what a flight tells of it at best. Numerical.
 const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03 };
-/// The same with what was found already, which keeps a search from going far.
+/// The same with what was found already: rougher, as all sizes are fitted anew where it leads to.
 const ROUGH_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.12 };
 /// The same where the model itself is nearest.
 const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03 };
