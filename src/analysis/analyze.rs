@@ -44,6 +44,7 @@ use super::truth;
 use super::turbulence;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
+use super::widened;
 use super::wind_forms::{Belief, WindForms};
 use super::wind_legs;
 use crate::flight::Indicator;
@@ -362,6 +363,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
             if let Some((map, modelled)) = map.as_mut().zip(modelled).filter(|_| options.posterior)
             {
                 posterior::add(map, modelled, shared, wind);
+                widened::widen(map);
             }
         },
         || places.and_then(|places| turbulence_of(shared, (&places, &seen), wind)),

@@ -68,6 +68,7 @@ mod truth;
 pub mod turbulence;
 pub mod updraft;
 mod warning;
+mod widened;
 pub mod wind;
 pub mod wind_forms;
 pub mod wind_legs;

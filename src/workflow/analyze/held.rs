@@ -26,8 +26,11 @@ const SAME_GROUND_M: f64 = 100.0;
 ///
 /// # Errors
 ///
-/// If the analysis cannot be read, or has no calibration.
-pub(super) fn read(path: &Path) -> Result<(FlightAnalysis, LawsFrom), WorkflowError> {
+/// If the analysis cannot be read, or has no calibration, or its laws are of another indicator.
+pub(super) fn read(
+    path: &Path,
+    indicator: Indicator,
+) -> Result<(FlightAnalysis, LawsFrom), WorkflowError> {
     let AnalysisFile { path: file, sha256, analysis } = AnalysisFile::read(path)?;
     let Analysis { title, flights, .. } = analysis;
     let calibration = flights
@@ -36,6 +39,15 @@ pub(super) fn read(path: &Path) -> Result<(FlightAnalysis, LawsFrom), WorkflowEr
         .ok_or_else(|| {
             WorkflowError::Usage(format!("{} has no calibration to hold", path.shown()))
         })?;
+    if calibration.indicator != indicator {
+        return Err(WorkflowError::Usage(format!(
+            "the laws of {} are of the {}, and here the {} is analysed; name the same indicator for both with \
+             --indicator",
+            path.shown(),
+            calibration.indicator.words(),
+            indicator.words()
+        )));
+    }
     let (start, drones) = (calibration.start(), calibration.results());
     let path = file.shown().to_string();
     Ok((calibration, LawsFrom { path, sha256, title, drones, start }))

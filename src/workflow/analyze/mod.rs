@@ -94,11 +94,11 @@ impl<'a> Analysing<'a> {
         for used in &work.used {
             host.say(used);
         }
-        let reference = hold.map(held::read).transpose()?;
+        let indicator = settings.options.indicator;
+        let reference = hold.map(|path| held::read(path, indicator)).transpose()?;
         for note in work.flights.iter().flat_map(|flight| &flight.notes) {
             host.warn(note);
         }
-        let indicator = settings.options.indicator;
         let doubts = hold
             .zip(reference.as_ref())
             .and_then(|(path, (reference, _))| doubts_of_held(path, reference, indicator, work));
