@@ -97,6 +97,22 @@ fn laws_of_other_drones_are_used_with_a_warning() {
 }
 
 #[test]
+fn laws_of_another_indicator_are_refused() {
+    let bench = flown();
+    let laws = ["--hold", "campaign/analysis.json", "--indicator", "power"];
+    let held = analyze(bench, 2, &[&["campaign/hover"], &laws[..]].concat());
+    let told: Vec<&str> = held.err.split_whitespace().collect();
+    let told = told.join(" ");
+    assert!(
+        told.contains(
+            "the laws of campaign/analysis.json are of the rotor control pulse width, and here the electrical \
+             power is analysed; name the same indicator for both with --indicator"
+        ),
+        "{held}"
+    );
+}
+
+#[test]
 fn a_hover_alone_is_whole_with_the_laws_of_an_earlier_day() {
     let bench = flown();
     let today = Bench::new();
