@@ -109,20 +109,23 @@ pub fn analyze(
     let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
     let mut before = 0;
     let mut flights: Vec<FlightAnalysis> = Vec::new();
+    let mut campaigns: Vec<usize> = Vec::new();
     let mut warnings = Vec::new();
     let mut failures = Vec::new();
-    // Flights without a plan that turned out to measure, before a calibration was found.
+    // Flights without a plan that turned out to measure, before a calibration of theirs was found.
     let mut early: Vec<(usize, &FlightInput<'_>)> = Vec::new();
     for input in order {
-        let laws = reference.or(calibration_of(&flights));
+        let own = calibration_of(&flights, &campaigns, input.campaign);
+        let laws = reference.or(own.map(|place| &flights[place]));
         let report = |done: usize, _: usize| progress(before + done, total);
         match analyze_flight(input, options, laws, &report) {
             Ok(flight) => {
                 let measured = flight.purpose == Purpose::Measurement;
-                if laws.is_none() && measured && purpose(input).is_none() {
+                if reference.is_none() && measured && purpose(input).is_none() {
                     early.push((flights.len(), input));
                 }
                 flights.push(flight);
+                campaigns.push(input.campaign);
             }
             Err(error) => {
                 // One warning for each line: what is told and, below it, of which log.
@@ -134,13 +137,17 @@ pub fn analyze(
         }
         before += input.logs.len();
     }
-    if let Some(laws) = calibration_of(&flights).cloned() {
-        for (index, input) in early {
-            // They could be analysed without laws: with them they can be as well.
-            if let Ok(flight) = analyze_flight(input, options, Some(&laws), &|_, _| {}) {
-                flights[index] = flight;
-            }
+    for (index, input) in early {
+        let of = |flights: &[FlightAnalysis]| calibration_of(flights, &campaigns, input.campaign);
+        let Some(laws) = of(&flights).filter(|laws| of(&flights[..index]) != Some(*laws)) else {
+            continue;
+        };
+        // They could be analysed before it: with its laws they can be as well.
+        if let Ok(flight) = analyze_flight(input, options, Some(&flights[laws]), &|_, _| {}) {
+            flights[index] = flight;
         }
+    }
+    if flights.iter().any(is_calibration) {
         flights.sort_by_key(|flight| flight.purpose == Purpose::Measurement);
     }
     if flights.is_empty() {
@@ -163,9 +170,20 @@ pub fn analyze(
     })
 }
 
-/// The first flight that gave laws for others.
-fn calibration_of(flights: &[FlightAnalysis]) -> Option<&FlightAnalysis> {
-    flights.iter().find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
+/// Whether a flight gives laws for others.
+fn is_calibration(flight: &FlightAnalysis) -> bool {
+    flight.purpose == Purpose::Calibration && flight.flock.is_some()
+}
+
+/// Place of the calibration for a campaign's flights: its own, else the first there is. `campaigns` are those of the flights.
+fn calibration_of(
+    flights: &[FlightAnalysis],
+    campaigns: &[usize],
+    campaign: usize,
+) -> Option<usize> {
+    let mut all = flights.iter().zip(campaigns);
+    all.position(|(flight, of)| *of == campaign && is_calibration(flight))
+        .or_else(|| flights.iter().position(is_calibration))
 }
 
 /// Reasons one below the other; the first ones of many.

@@ -81,11 +81,15 @@ pub struct FlightInput<'a> {
     pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
+    /// Whether its calibration was simulated in air of other scales.
+    pub calibrated_in_other_air: bool,
     /// Response of the vehicle whose level the flight gives; `None`: the map is inverted with the
     /// calibration's laws.
     pub level: Option<&'a Level>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
+    /// Number of the campaign that the flight is of: its own calibration goes before those of others.
+    pub campaign: usize,
 }
 
 impl FlightInput<'_> {

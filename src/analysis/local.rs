@@ -17,6 +17,11 @@ const SCALE_DRONES: usize = 25;
 /// Spread of both bends between the drones of a fleet, us/(m/s)²: a fifth of the fleet's own
 /// (docs/physics.md, 2.3). Chosen.
 const OWN_BEND_SD: f64 = 0.2;
+/// Spread of the drones' constants, us: that of the nine in the paper's Table II.
+const CONSTANT_SD_US: f64 = 7.8;
+/// Spread of their slopes as a share of them, likewise.
+const SLOPE_SHARE_SD: f64 = 0.1;
+
 /// One drone's own part of the parameters.
 pub(super) struct Own {
     pub(super) value: Vector4<f64>,
@@ -49,7 +54,7 @@ pub(super) fn local_air(of: &Deviations<'_>) -> Local {
     of.points.iter().enumerate().for_each(|(index, point)| of_drone[point.drone].push(index));
     let flown = of_drone.iter().filter(|own| !own.is_empty()).count();
     if flown < 2 {
-        return undivided(&of_drone);
+        return undivided(&of_drone, of.rough);
     }
     // Averages were taken from the same points: deviations are too small by this.
     let grow = (flown as f64 / (flown as f64 - 1.0)).sqrt();
@@ -61,22 +66,20 @@ pub(super) fn local_air(of: &Deviations<'_>) -> Local {
         .zip(&records)
         .map(|(own, record)| of.own(own, record.as_ref()?, &weighed, grow))
         .collect();
-    let spread = spread(&drones);
+    let spread = spread(&drones, of.rough);
     Local { drones, spread, sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps) }
 }
 
 /// A single drone is the fleet: it has no deviation.
-fn undivided(of_drone: &[Vec<usize>]) -> Local {
+fn undivided(of_drone: &[Vec<usize>], rough: f64) -> Local {
     let none = || Own {
         value: Vector4::zeros(),
         covariance: Matrix4::zeros(),
         answers: [[0.0; PARAMETERS]; DOUBTS],
     };
-    Local {
-        drones: of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect(),
-        spread: Matrix4::zeros(),
-        sd_mps: 0.0,
-    }
+    let drones: Vec<Option<Own>> =
+        of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect();
+    Local { spread: spread(&drones, rough), drones, sd_mps: 0.0 }
 }
 
 /// Weighs the scales of local air. A few dozen drones tell them as well as a thousand.
@@ -91,16 +94,18 @@ fn scales(records: &[Option<Record>]) -> Vec<Weighed<()>> {
     })
 }
 
-/// Covariance of the deviation of a drone that is not known, from those that are.
-fn spread(drones: &[Option<Own>]) -> Matrix4<f64> {
+/// Covariance of the deviation of a drone that is not known, from those that are, and from what drones of one make differ by:
+/// of one that is known nothing else tells it, of many it hardly counts.
+fn spread(drones: &[Option<Own>], rough: f64) -> Matrix4<f64> {
     let known: Vec<Vector4<f64>> = drones.iter().flatten().map(|own| own.value).collect();
-    let n = known.len() as f64;
-    let mut spread = Matrix4::zeros();
+    let n = known.len().max(1) as f64;
+    let usual = [CONSTANT_SD_US, SLOPE_SHARE_SD * rough, OWN_BEND_SD, OWN_BEND_SD];
+    let mut spread = Matrix4::from_diagonal(&Vector4::from(usual.map(|sd| sd * sd)));
     for value in &known {
-        spread += value * value.transpose() / (n - 1.0).max(1.0);
+        spread += value * value.transpose();
     }
-    spread *= 1.0 + 1.0 / n.max(1.0);
-    spread
+    // Weighs as one degree of freedom; the fleet's mean took one of the n.
+    spread * ((1.0 + 1.0 / n) / n)
 }
 
 impl Deviations<'_> {
@@ -166,5 +171,31 @@ impl Deviations<'_> {
             apply(&DVector::from_fn(record.pulse_us.len(), column)).into()
         });
         Some(Own { value: apply(&record.pulse_us) / grow, covariance, answers })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_one_drone_the_spread_is_that_of_its_make_and_of_many_their_own() {
+        let of = |values_us: &[f64]| {
+            let own = |value_us: &f64| {
+                Some(Own {
+                    value: Vector4::new(*value_us, 0.0, 0.0, 0.0),
+                    covariance: Matrix4::zeros(),
+                    answers: [[0.0; PARAMETERS]; DOUBTS],
+                })
+            };
+            let drones: Vec<Option<Own>> = values_us.iter().map(own).collect();
+            spread(&drones, 26.0)[(0, 0)].sqrt()
+        };
+        let apart = std::f64::consts::SQRT_2 * CONSTANT_SD_US;
+        assert!((of(&[0.0]) - apart).abs() < 1e-9, "one drone against another");
+        let many: Vec<f64> =
+            (0..400).map(|index| if index % 2 == 0 { 2.0 } else { -2.0 }).collect();
+        assert!((of(&many) - 2.0).abs() < 0.05, "{}", of(&many));
+        assert!(of(&[0.5, -0.5]) > 4.0, "two that are alike by chance");
     }
 }

@@ -22,6 +22,8 @@ const LONGEST_S: usize = 200_000;
 /// What a log showed of its hover, besides the running means of the map.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HoverSeen {
+    /// Show time of the first second, s.
+    start_s: f64,
     /// Means over each second of the tilt-corrected pulse, us, and of the vertical velocity, m/s.
     seconds: Vec<Option<(f64, f64)>>,
     /// Tangents of the mean lean forward and to the right.
@@ -50,12 +52,51 @@ impl HoverSeen {
             })
             .collect();
         Self {
+            start_s: hover.start_s,
             seconds,
             forward_right: forward_right(flight, hover),
             heading_deg: heading_deg(flight, hover),
             beside: Beside::default(),
             records: None,
         }
+    }
+}
+
+impl HoverSeen {
+    /// Vertical air speeds of single seconds by one slope of the pulse, m/s, but for a constant. With `corrected` they move
+    /// as the map's values do over running means: what wind that comes and goes does to a leaning drone is no air.
+    fn values_mps(
+        &self,
+        slope_us_per_mps: f64,
+        time_s: &[f64],
+        mapped_mps: &[Option<f64>],
+        corrected: bool,
+    ) -> Vec<Option<f64>> {
+        let one = |(pulse_us, up_mps): (f64, f64)| up_mps - pulse_us / slope_us_per_mps;
+        let mut values: Vec<Option<f64>> =
+            self.seconds.iter().map(|second| second.map(one)).collect();
+        let Some(first_s) = time_s.first().filter(|_| corrected) else { return values };
+        let half = (RUNNING_S / 2.0) as usize;
+        let apart = |second: usize| -> Option<f64> {
+            let index = (self.start_s + second as f64 - first_s).round();
+            let mapped = (*mapped_mps.get((index >= 0.0).then_some(index as usize)?)?)?;
+            let around = values.get(second.checked_sub(half)?..second + half)?;
+            Some(mapped - mean(around.iter().flatten())?)
+        };
+        let mut moved: Vec<Option<f64>> = (0..values.len()).map(apart).collect();
+        // The first and the last seconds have no running mean: the nearest one's is theirs.
+        if let Some(first) = moved.iter().position(Option::is_some) {
+            let at = moved[first];
+            moved[..first].fill(at);
+        }
+        if let Some(last) = moved.iter().rposition(Option::is_some) {
+            let at = moved[last];
+            moved[last..].fill(at);
+        }
+        for (value, moved) in values.iter_mut().zip(moved) {
+            *value = value.zip(moved).map(|(value, moved)| value + moved);
+        }
+        values
     }
 }
 
@@ -98,15 +139,12 @@ pub(super) fn of_map(
     let of_level = levelled.map(|drone| drone.slope);
     match of_level.or_else(|| map.flock.as_ref().and_then(slope_us_per_mps)) {
         Some(slope) => {
+            let corrected = map.common.is_some() && map.wind.is_some();
             let fleet: Vec<Seconds> = drones()
                 .map(|(drone, seen)| Seconds {
                     slot: drone.slot,
                     name: drone.name.clone(),
-                    values_mps: seen
-                        .seconds
-                        .iter()
-                        .map(|second| second.map(|(pulse_us, up_mps)| up_mps - pulse_us / slope))
-                        .collect(),
+                    values_mps: seen.values_mps(slope, &map.time_s, &drone.updraft_mps, corrected),
                 })
                 .collect();
             statistics.baseline = baseline(&fleet);
@@ -156,6 +194,31 @@ mod tests {
         let (kind, label) = (SegmentKind::Hover, String::new());
         let hover = Target { kind, label, start_s: 0.0, end_s: 10.0, commanded_mps: 0.0 };
         heading_deg(&Flight { yaw_deg, ..Flight::default() }, &hover)
+    }
+
+    #[test]
+    fn what_wind_does_to_the_pulse_is_no_air_of_single_seconds() {
+        // Gusts of the air that change every second, and a wind that comes and goes in a minute.
+        let air = |second: usize| if second % 2 == 0 { 0.3 } else { -0.3 };
+        let wind = |second: f64| (second / 60.0 * std::f64::consts::TAU).sin();
+        let (slope, start_s) = (20.0, 7.0);
+        let seconds: Vec<Option<(f64, f64)>> = (0..120)
+            .map(|second| Some((1500.0 - slope * (air(second) + wind(second as f64)), 0.0)))
+            .collect();
+        let seen = HoverSeen { start_s, seconds, ..HoverSeen::default() };
+        let time_s: Vec<f64> = (12..122).map(f64::from).collect();
+        // The map has neither the gusts, over ten seconds, nor the wind.
+        let mapped = vec![Some(0.1); time_s.len()];
+        let found = seen.values_mps(slope, &time_s, &mapped, true);
+        assert_eq!(found.len(), 120);
+        for (second, value) in found.iter().enumerate().take(110).skip(10) {
+            let value = value.unwrap();
+            assert!((value - 0.1 - air(second)).abs() < 0.07, "{second}: {value}");
+        }
+        assert!(found.iter().all(Option::is_some), "the ends have the nearest one's correction");
+        let as_seen = seen.values_mps(slope, &time_s, &mapped, false);
+        let level = -1500.0 / slope;
+        assert!((as_seen[15].unwrap() - level - air(15) - wind(15.0)).abs() < 1e-9);
     }
 
     #[test]

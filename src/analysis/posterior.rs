@@ -149,9 +149,13 @@ pub(super) fn add(
     });
 }
 
-/// The parts of the air that a flight was simulated in, where the covariances of all are known.
+/// The parts of the air that a flight was simulated in, where the covariances of all are known and those of its calibration's air
+/// are the same.
 fn known_air(shared: &Shared<'_>) -> Option<Vec<Air>> {
-    let TrueAir { field, gusts } = shared.input.true_air?;
+    let TrueAir { field, gusts, beside } = shared.input.true_air?;
+    if !beside.is_empty() || shared.input.calibrated_in_other_air {
+        return None;
+    }
     let mut parts = Vec::new();
     if let Some(field) = field {
         parts.push(Air {

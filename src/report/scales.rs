@@ -96,6 +96,7 @@ pub(super) fn true_air_words(air: &TrueAir) -> String {
             rounded(gusts.length_m)
         ));
     }
+    parts.extend(air.beside.iter().map(|motion| clean(motion)));
     let shorter = if air.field.is_some() && !air.gusts.is_empty() {
         ". The gusts have a length of their own: estimates that know one scale only come out shorter \
          than the field's"
@@ -271,9 +272,9 @@ mod tests {
             time_s: None,
             drift_mps: None,
         };
-        let both = TrueAir { field: Some(field), gusts: vec![gusts.clone()] };
+        let both = TrueAir { field: Some(field), gusts: vec![gusts.clone()], ..TrueAir::default() };
         assert!(true_air_words(&both).contains("come out shorter"));
-        let alone = TrueAir { field: None, gusts: vec![gusts] };
+        let alone = TrueAir { gusts: vec![gusts], ..TrueAir::default() };
         assert!(!true_air_words(&alone).contains("come out shorter"));
     }
 }

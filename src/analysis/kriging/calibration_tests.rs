@@ -198,6 +198,41 @@ fn two_drones_that_hover_have_no_map_of_the_air() {
     assert!(has_map(3));
 }
 
+#[test]
+fn air_that_differs_from_drone_to_drone_and_lasts_is_air() {
+    let mut rng = stream(12, 1, Purpose::Sensors);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let homes_m: Vec<[f64; 2]> =
+        (0..9).map(|index| [7.0 * f64::from(index % 3), 7.0 * f64::from(index / 3)]).collect();
+    let windows = windows(ladder(), 0.15, |_| 0.0);
+    let truths_mps: Vec<f64> = homes_m.iter().map(|_| 0.4 * normal()).collect();
+    let mut drone = |([x, y], truth_mps): (&[f64; 2], &f64)| {
+        let mut value = || Value {
+            updraft_mps: truth_mps + 0.01 * normal(),
+            law: [1.0 / SLOPE_US, 0.0, 0.0, 0.0],
+            doubts_mps: [0.0; DOUBTS],
+            own_mps: 0.01,
+            noise_mps: 0.01,
+        };
+        Drone {
+            place_m: vec![[*x, *y, 60.0]],
+            values: (0..120).map(|_| Some(value())).collect(),
+            ..Drone::default()
+        }
+    };
+    let drones: Vec<Drone> = homes_m.iter().zip(&truths_mps).map(&mut drone).collect();
+    let calibration = Calibration::new(&windows, &homes_m, SLOPE_US);
+    let input = Input { drones: &drones, lost_m: &[], seconds: 120, calibration, wind_mps: None };
+    let map = posterior(&input).unwrap();
+    // Without their mean, which may be the zero's.
+    let found: Vec<f64> = map.drones.iter().map(|one| one.over_all.unwrap().0).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / 9.0;
+    for (found_mps, truth_mps) in found.iter().zip(&truths_mps) {
+        let error_mps = (found_mps - mean(&found)) - (truth_mps - mean(&truths_mps));
+        assert!(error_mps.abs() < 0.1, "{found:.2?} {truths_mps:.2?}");
+    }
+}
+
 /// A fleet over which all air rises alike; the calibration's zero, in still air, is off by the doubt of a wind.
 fn rises_mps(updraft_mps: f64, doubt_mps: f64) -> Posterior {
     let mut rng = stream(9, 1, Purpose::Sensors);

@@ -138,6 +138,7 @@ fn mapped(drones: &[Drone]) -> Vec<Series> {
         slope_share: 0.0,
         wind_mps: None,
         factor,
+        lasting_mps: 0.0,
     };
     let mut forms = search.all();
     search.wind_mps = moving::drift(&search, &forms[0]);

@@ -277,8 +277,11 @@ impl Series {
         }
     }
 
-    /// Drops what lies before the first and behind the last value of a drone.
+    /// Drops what lies before the first and behind the last value of a drone that moved: where it would have been nobody knows.
     pub(super) fn keep_near(&mut self, drone: &Drone) {
+        if drone.hovers() {
+            return;
+        }
         let has = |value: &Option<super::data::Value>| value.is_some();
         let first = drone.values.iter().position(has).unwrap_or(usize::MAX);
         let last = drone.values.iter().rposition(has).unwrap_or(0);

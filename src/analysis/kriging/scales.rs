@@ -63,6 +63,11 @@ const SLOPE_STEP: f64 = 1e-4;
 const CALM_MPS: f64 = 0.2;
 /// Length of gusts that a search begins with, m: their scale is about their height above the ground.
 const GUSTS_M: f64 = 30.0;
+/// Length and time of air that differs from drone to drone and lasts, with which a search begins, m and s: shorter than drones
+/// are apart, longer than a hover.
+const LASTING_M: f64 = 5.0;
+/// See [`LASTING_M`].
+const LASTING_S: f64 = 3000.0;
 /// Slow air that it begins with besides, m/s.
 const SLOW_MPS: f64 = 0.5;
 
@@ -139,6 +144,9 @@ pub(super) struct Search<'a> {
     pub(super) wind_mps: Option<[f64; 2]>,
     /// Factor of the prior covariance of the common errors.
     pub(super) factor: Common,
+    /// By how much the drones' means over the record lie apart about a plane, m/s, where that is more than their constants
+    /// allow; else 0.
+    pub(super) lasting_mps: f64,
 }
 
 /// Kind of air that a likelihood takes the field for; no scale leads over from one to another.
@@ -157,13 +165,25 @@ impl Family {
         Form::ALL.into_iter().flat_map(of).collect()
     }
 
-    /// Where the search for its scales begins: those of a field day, and of gusts that drift over slow air.
-    fn starts(self) -> Vec<Point> {
+    /// Where the search for its scales begins: those of a field day, of gusts that drift over slow air, and of air that lasts
+    /// and differs from drone to drone by `lasting_mps`, if it does.
+    fn starts(self, lasting_mps: f64) -> Vec<Point> {
         let start = PRIOR.map(|(mean, _)| mean);
-        let mut gusts = start;
-        gusts[LN_LENGTH] = GUSTS_M.ln();
-        gusts[LN_SLOW] = SLOW_MPS.ln();
-        if self.drifts { vec![start, gusts] } else { vec![start] }
+        let mut starts = vec![start];
+        if self.drifts {
+            let mut gusts = start;
+            gusts[LN_LENGTH] = GUSTS_M.ln();
+            gusts[LN_SLOW] = SLOW_MPS.ln();
+            starts.push(gusts);
+        } else if lasting_mps > 0.0 {
+            // From longer ones the search ends where the drones' constants are stretched and the air is still.
+            let mut lasting = start;
+            lasting[LN_SD] = lasting_mps.ln();
+            lasting[LN_LENGTH] = LASTING_M.ln();
+            lasting[LN_TIME] = LASTING_S.ln();
+            starts.push(lasting);
+        }
+        starts
     }
 }
 
@@ -291,7 +311,10 @@ impl Search<'_> {
         let families = Family::all(drifts);
         let starts: Vec<(Family, Point)> = families
             .iter()
-            .flat_map(|family| family.starts().into_iter().map(move |start| (*family, start)))
+            .flat_map(|family| {
+                let starts = family.starts(self.lasting_mps);
+                starts.into_iter().map(move |start| (*family, start))
+            })
             .collect();
         let climbed: Vec<Top> =
             starts.par_iter().map(|(family, start)| self.climb(*family, *start)).collect();

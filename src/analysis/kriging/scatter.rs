@@ -43,6 +43,11 @@ impl Scatter {
         variance.is_finite().then_some(Self { variance, freedom })
     }
 
+    /// Standard deviation about the plane, m/s.
+    pub(super) fn sd_mps(self) -> f64 {
+        self.variance.sqrt()
+    }
+
     /// Logarithm of the likelihood, but for a constant, where air adds so much to the variance of the drones' own
     /// constants, (m/s)².
     pub(super) fn ln_likelihood(&self, by_air: f64) -> f64 {

@@ -118,6 +118,7 @@ fn neighbours_stand_for_all_values() {
         slope_share: 0.0,
         wind_mps: None,
         factor,
+        lasting_mps: 0.0,
     };
     let system = search.system_in(&covariance).unwrap();
     let posterior = system.posterior(&CommonVector::zeros(), &factor).unwrap();

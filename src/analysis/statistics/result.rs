@@ -59,6 +59,9 @@ pub struct TrueAir {
     /// Gusts on top of it.
     #[serde(default)]
     pub gusts: Vec<TrueGusts>,
+    /// Vertical motions besides, which no scales describe: thermals, a steady updraft; absent: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<String>,
 }
 
 /// A random field: `sd² exp(-r / lambda) exp(-|dt| / tau)`.

@@ -217,7 +217,8 @@ fn scales(air: &AirSettings) -> TrueAir {
         time_s: Some(air.own_s),
         drift_mps: None,
     };
-    TrueAir { field, gusts: if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() } }
+    let gusts = if air.own_mps > 0.0 { vec![gusts] } else { Vec::new() };
+    TrueAir { field, gusts, beside: Vec::new() }
 }
 
 /// Slots whose log is lost.

@@ -71,6 +71,10 @@ pub fn gather(request: &Request) -> Result<(Work, Option<Indicator>), WorkflowEr
         behind.resize(work.flights.len(), index);
     }
     twice::refuse(&request.paths, &work)?;
+    let campaigns = campaigns(&request.paths);
+    for (flight, path) in work.flights.iter_mut().zip(&behind) {
+        flight.campaign = campaigns.get(*path).copied().unwrap_or_default();
+    }
     name_apart(&mut work.flights, &request.paths, &behind);
     let mut indicator = None;
     if let Some(mapping) = &request.tables {
@@ -93,6 +97,18 @@ pub fn gather(request: &Request) -> Result<(Work, Option<Indicator>), WorkflowEr
         start_at(&mut work.flights, unix_s)?;
     }
     Ok((work, indicator))
+}
+
+/// Number of the campaign that each path is, or lies in; else its own.
+fn campaigns(paths: &[PathBuf]) -> Vec<usize> {
+    let root = |path: &PathBuf| {
+        let path = path.canonicalize().unwrap_or_else(|_| path.clone());
+        let above = path.parent().filter(|above| campaign::is_campaign(above));
+        above.map_or_else(|| path.clone(), Path::to_owned)
+    };
+    let roots: Vec<PathBuf> = paths.iter().map(root).collect();
+    let first = |root| roots.iter().position(|other| other == root).unwrap_or_default();
+    roots.iter().map(first).collect()
 }
 
 /// All flights began then, whatever is written of them.

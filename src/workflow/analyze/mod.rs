@@ -229,11 +229,23 @@ fn input<'a>(
         thrust_exponent: flight.thrust_exponent,
         sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
         true_air: flight.true_air.as_ref(),
+        calibrated_in_other_air: calibrated_in_other_air(work, flight),
         wind_forms: flight.wind_forms.as_ref().filter(|_| !without.wind),
         lean_table: table.filter(|_| !without.wind),
         level: flight.level.as_ref(),
         folder: Some(&work.root),
+        campaign: flight.campaign,
     }
+}
+
+/// Whether a calibration of the same campaign was simulated in air of other scales.
+fn calibrated_in_other_air(work: &Work, flight: &Found) -> bool {
+    let is_its_calibration = |other: &&Found| {
+        other.campaign == flight.campaign && other.purpose == Some(Purpose::Calibration)
+    };
+    let mut calibrations = work.flights.iter().filter(is_its_calibration);
+    // Of a flight that was not simulated here nothing is known.
+    calibrations.any(|other| other.seed.is_some() && other.true_air != flight.true_air)
 }
 
 /// One flight as the analysis takes it, with all corrections.

@@ -89,6 +89,7 @@ pub(super) fn found_flight(
         true_air,
         seed: record.map(|record| record.seed),
         notes,
+        campaign: 0,
     })
 }
 

@@ -82,6 +82,8 @@ pub struct Found {
     pub true_air: Option<TrueAir>,
     /// Doubts about the files, one sentence each.
     pub notes: Vec<String>,
+    /// Number of the campaign, or else of the path, that it is of.
+    pub campaign: usize,
 }
 
 /// Work for an analysis: flights found behind paths.

@@ -42,7 +42,32 @@ pub(super) fn true_scales(
             })
         })
         .collect();
-    (field.is_some() || !gusts.is_empty()).then_some(TrueAir { field, gusts })
+    let beside = beside(components, uniform_mps[2]);
+    (field.is_some() || !gusts.is_empty()).then_some(TrueAir { field, gusts, beside })
+}
+
+/// Vertical motions of a record that have no scales, in words.
+fn beside(components: &[String], up_mps: f64) -> Vec<String> {
+    let words = |text: &String| -> Option<String> {
+        let Ok(spec) = text.parse::<AirSpec>() else {
+            return Some(format!("air that this version does not know ({text})"));
+        };
+        let words = match spec.kind().name {
+            "still" | "wind" | "profile" | "field" | "dryden" | "von-karman" => return None,
+            "uniform" if spec.value("up") == 0.0 => return None,
+            "uniform" => "a steady updraft".to_owned(),
+            "drone-constant" => "an updraft of each drone's own place".to_owned(),
+            "lenschow" => "convective turbulence (Lenschow)".to_owned(),
+            "les" => "a simulation of large eddies".to_owned(),
+            other => other.to_owned(),
+        };
+        Some(words)
+    };
+    let mut found: Vec<String> = components.iter().filter_map(words).collect();
+    if up_mps != 0.0 && !found.iter().any(|one| one == "a steady updraft") {
+        found.push("a steady updraft".to_owned());
+    }
+    found
 }
 
 /// The wind that carries gusts, along x and y of the show frame, m/s; `None` without wind.
@@ -90,6 +115,12 @@ mod tests {
         let [x, y] = slow.gusts[0].drift_mps.unwrap();
         // Towards south, which is to the right of east, and no slower than 1 m/s.
         assert!(x.abs() < 1e-9 && (y + 1.0).abs() < 1e-9, "{x} {y}");
+        let none: [&str; 0] = [];
+        assert_eq!(slow.beside, none);
+        let thermals = scales(&["dryden:sd=0.2,length=30", "thermals:w_star=2", "lenschow"]);
+        assert_eq!(thermals.unwrap().beside, ["thermals", "convective turbulence (Lenschow)"]);
+        let rising = true_scales(&["field:sd=0.5".to_owned()], [0.0, 0.0, 1.5], 0.0);
+        assert_eq!(rising.unwrap().beside, ["a steady updraft"]);
         assert_eq!(scales(&["wind:speed=3"]), None);
         assert_eq!(scales(&["field:lambda=50", "field:lambda=200"]), None, "no one length");
         assert_eq!(scales(&["of a later version"]), None);

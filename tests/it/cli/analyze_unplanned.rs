@@ -97,6 +97,33 @@ fn laws_of_other_drones_are_used_with_a_warning() {
 }
 
 #[test]
+fn each_campaign_has_its_own_calibration() {
+    let bench = flown();
+    let other = Bench::new();
+    let more = ["--seed", "5", "--vehicle", "phantom4", "--updraft", "1"];
+    fly(&other, "campaign", &more);
+    let path = other.path("campaign");
+    let path = path.to_str().unwrap();
+    let means = |args: &[&str]| -> Vec<(String, f64)> {
+        let ended = analyze(bench, 0, &[args, &["--json"]].concat());
+        let found: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
+        let flights = found["flights"].as_array().unwrap().iter();
+        flights
+            .filter_map(|flight| {
+                let mean = flight["map"]["drones"][0]["mean"]["value"].as_f64()?;
+                Some((flight["name"].as_str()?.to_owned(), mean))
+            })
+            .collect()
+    };
+    let alone = [means(&["campaign"]), means(&[path])];
+    let together = means(&["campaign", path]);
+    assert_eq!(together.len(), 2, "{together:?}");
+    for ((_, alone), (name, together)) in alone.iter().flatten().zip(&together) {
+        assert!((alone - together).abs() < 1e-12, "{name}: {together} instead of {alone}");
+    }
+}
+
+#[test]
 fn laws_of_another_indicator_are_refused() {
     let bench = flown();
     let laws = ["--hold", "campaign/analysis.json", "--indicator", "power"];

@@ -226,6 +226,7 @@ fn with_search<T>(
         slope_share: 0.0,
         wind_mps,
         factor,
+        lasting_mps: 0.0,
     })
 }
 
