@@ -97,6 +97,42 @@ fn laws_of_other_drones_are_used_with_a_warning() {
 }
 
 #[test]
+fn laws_of_other_drones_are_doubted_for_a_ladder_alone() {
+    let bench = flown();
+    let other = Bench::new();
+    fly(&other, "campaign", &["--seed", "5", "--vehicle", "airsim-generic-quad"]);
+    let laws = other.path("campaign/analysis.json");
+    let hold = ["campaign/calibration", "--hold", laws.to_str().unwrap()];
+    let held = analyze(bench, 0, &hold);
+    let told = held.out.split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in [
+        "seem to be those of other drones: they flew airsim-generic-quad, and calibration flew pixel; they were \
+         simulated with seed 5, and calibration with seed 1: other drones",
+        "with another fleet's laws the updraft is wrong",
+        // And what the windows themselves say.
+        "no updraft within 8 m/s brings the ladder's windows onto the calibration's curve",
+        "this seems to be the calibration of another vehicle",
+    ] {
+        assert!(told.contains(words), "{words}: {held}");
+    }
+    assert!(!told.contains("A and u0 held"), "no W* by the law of another vehicle: {held}");
+    let json = analyze(bench, 0, &[&hold[..], &["--json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(json["analysis"]["warnings"].as_array().unwrap().len(), 1, "{json}");
+
+    // The same drones' own calibration, and their ladder on another day.
+    let again = Bench::new();
+    fly(&again, "campaign", &[]);
+    let own = bench.path("campaign/analysis.json");
+    for bench in [bench, &again] {
+        let held = ["campaign/calibration", "--hold", own.to_str().unwrap()];
+        let held = analyze(bench, 0, &held);
+        assert!(!held.out.contains("those of other drones"), "{held}");
+        assert!(!held.out.contains("another vehicle"), "{held}");
+    }
+}
+
+#[test]
 fn laws_of_another_indicator_are_refused() {
     let bench = flown();
     let laws = ["--hold", "campaign/analysis.json", "--indicator", "power"];
