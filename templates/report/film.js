@@ -18,7 +18,7 @@ for (const film of document.querySelectorAll(".film")) {
     estimate: together,
     truth,
     difference: less(together),
-    names: { estimate: "Posterior W", difference: "Posterior W − true W" },
+    names: { estimate: "Posterior W", difference: "Posterior W − W" },
   };
   const field = data.posterior?.field ?? null;
   const cells = field && decoded(field.values);

@@ -171,7 +171,7 @@ fn beside_the_scales_of_a_posterior_there_are_no_others() {
 fn what_a_posterior_shows_is_not_called_an_estimate_of_single_drones() {
     let report = made(&posterior(whole_campaign()));
     let page = report.html.replace("&#x2f;", "/");
-    assert!(page.contains("estimated − true W (m/s)") && page.contains("Posterior W − true W"));
+    assert!(page.contains("estimated − true W (m/s)") && page.contains("Posterior W − W"));
     assert!(!page.contains(">W* − W (m/s)<") && !page.contains(">W* and W (m/s, up positive)<"));
     // The lost drone's square has its error, and is counted as what it is.
     let (_, figure) = report.figures.iter().find(|(name, _)| name == "posterior-hover").unwrap();
