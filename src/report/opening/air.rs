@@ -247,7 +247,7 @@ fn slope_sentence(flight: &FlightAnalysis) -> Option<String> {
     }
     let laws = law::flight_laws(flight)?;
     let kind = headline::preferred(flight).or_else(|| crate::analysis::prefer::better_of(laws))?;
-    let fit = law::fit_of(laws, kind)?;
+    let fit = law::fit_of(laws, kind).filter(|fit| fit.w_beyond_mps.is_none())?;
     match kind {
         LawKind::Linear => Some(format!(
             "The effort changes by {} {effort} for each m/s of vertical speed through the air.",
