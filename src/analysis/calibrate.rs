@@ -79,6 +79,8 @@ pub struct FitOptions {
     pub with_hovers: bool,
     /// A and u0 to hold in an additional fit of W; `None`: no such fit.
     pub hold: Option<Hold>,
+    /// Whether a W whose error reaches beyond the searched range counts as a number, as in the paper's tables.
+    pub wide_w_counts: bool,
 }
 
 /// Error of a calibration.
@@ -209,7 +211,10 @@ fn fit_points(
     let held = held?.zip(options.hold).map(|(fit, hold)| {
         untuned(fit, law::signed_quadratic_held(measured, hold.a, hold.u0_us, scale))
     });
-    let in_units = |fit: Fit| in_units_of(options.indicator, fit);
+    let in_units = |fit: Fit| {
+        let fit = in_units_of(options.indicator, fit);
+        if options.wide_w_counts { fit } else { law::bounded(fit) }
+    };
     Ok(Laws {
         signed_quadratic: law::signed_quadratic(&points, scale)
             .ok()

@@ -53,8 +53,8 @@ pub struct Fit {
     pub other_minima: Vec<Vec<f64>>,
     /// What is doubtful about this fit.
     pub warnings: Vec<FitWarning>,
-    /// The edge of the searched range of W where the fit ended, m/s: W lies beyond, and no other parameter of the
-    /// fit means anything. Absent: it ended within.
+    /// The edge of the searched range of W where the fit ended, or that two standard errors of its W reach, m/s: W may
+    /// lie beyond, and no parameter of the fit means anything. Absent: it ended within.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub w_beyond_mps: Option<f64>,
 }
@@ -86,6 +86,12 @@ pub struct Parameter {
 }
 
 impl Laws {
+    /// Fit with A and u0 held, if there is one and they are not those of another vehicle.
+    pub fn of_own_vehicle(&self) -> Option<&Fit> {
+        let is_other = self.held.as_ref().is_some_and(|held| held.is_other_vehicle);
+        self.signed_quadratic_held.as_ref().filter(|_| !is_other)
+    }
+
     /// Free fit of a law, if there is one.
     pub fn of(&self, law: LawKind) -> Option<&Fit> {
         match law {

@@ -217,6 +217,20 @@ pub fn signed_quadratic_held(
     Ok(fit)
 }
 
+/// Standard errors of a W that must lie within the searched range for it to be a number.
+const W_ERRORS: f64 = 2.0;
+
+/// A fit whose W is marked as beyond the searched range if its error reaches there: the search cut off what the windows
+/// leave open.
+pub(super) fn bounded(fit: Fit) -> Fit {
+    let reached = fit.parameter(Symbol::W).and_then(|w| {
+        let Estimate { value, se } = w.estimate;
+        let reaches = value.abs() + W_ERRORS * se > W_LIMIT_MPS;
+        reaches.then_some(W_LIMIT_MPS.copysign(value))
+    });
+    Fit { w_beyond_mps: fit.w_beyond_mps.or(reached), ..fit }
+}
+
 fn check(points: &[LawPoint], parameters: usize) -> Result<(), FitError> {
     if points.len() < parameters {
         return Err(FitError::TooFewPoints { points: points.len(), parameters });
@@ -453,6 +467,27 @@ mod tests {
                 assert!((slope - rise / (2.0 * step)).abs() < 1e-4, "{law:?} at {velocity}");
             }
         }
+    }
+
+    #[test]
+    fn a_w_is_a_number_if_its_error_lies_within_the_search() {
+        let fit = |w_mps: f64, se: f64| {
+            let points: Vec<LawPoint> = (-3..=3)
+                .map(|rung| LawPoint {
+                    velocity_mps: f64::from(rung),
+                    pulse_us: 1546.0 + 8.0 * signed_square(f64::from(rung)),
+                    sigma_us: 1.0,
+                    velocity_sigma_mps: 0.0,
+                })
+                .collect();
+            let mut fit = signed_quadratic(&points, ErrorScale::Unscaled).unwrap();
+            fit.parameters[2].estimate = Estimate::new(w_mps, se);
+            bounded(fit).w_beyond_mps
+        };
+        assert_eq!((fit(-0.4, 0.2), fit(-5.3, 1.3)), (None, None));
+        // Near the bound, and without any knowledge.
+        assert_eq!((fit(-7.975, 4.2), fit(3.0, 600.0)), (Some(-8.0), Some(8.0)));
+        assert_eq!(fit(-6.3, 2.2), Some(-8.0));
     }
 
     #[test]

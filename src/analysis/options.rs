@@ -90,6 +90,7 @@ impl AnalysisOptions {
     pub(super) fn of_flight(&self, input: &FlightInput<'_>) -> Self {
         let mut options = self.clone();
         options.fit.indicator = options.indicator;
+        options.fit.wide_w_counts = self.plain;
         options.windows.thrust_exponent = options.windows.thrust_exponent.or(input.thrust_exponent);
         if self.paper_windows {
             let field = self.offset.is_subtracted(input.true_updraft_mps);

@@ -185,7 +185,7 @@ type FitOf = fn(&Laws) -> Option<&Fit>;
 /// with ours only when the weights are the same ([`Weights::WindowSd`]).
 ///
 /// Fits that ended at the edge of the searched range of W are left out, unless `with_edges` (as the paper's
-/// table has them).
+/// table has them), and fits with laws of another vehicle held.
 pub fn table(
     laws_of: &[&Laws],
     paper: Option<PaperTable>,
@@ -195,7 +195,7 @@ pub fn table(
     let FitOptions { weights, indicator, .. } = *options;
     let laws: [(TableLaw, FitOf); 3] = [
         (TableLaw::SignedQuadratic, |laws| laws.signed_quadratic.as_ref()),
-        (TableLaw::SignedQuadraticHeld, |laws| laws.signed_quadratic_held.as_ref()),
+        (TableLaw::SignedQuadraticHeld, Laws::of_own_vehicle),
         (TableLaw::Linear, |laws| laws.linear.as_ref()),
     ];
     let mut rows = Vec::new();

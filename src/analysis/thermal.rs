@@ -49,6 +49,23 @@ impl Thermal {
         Estimate::new(of.value, NORMAL * of.se)
     }
 
+    /// A size, which cannot be negative, as by [`Thermal::interval`], to two digits of its error; `None` if the error
+    /// exceeds it, so that it is not determined.
+    pub fn size(of: &Estimate) -> Option<Estimate> {
+        let Estimate { value, se } = Self::interval(of);
+        if !(value.is_finite() && se.is_finite() && se <= value.abs()) {
+            return None;
+        }
+        // Below a hundred the decimals do this.
+        let digit = 10_f64.powi((se.max(1.0).log10().floor() as i32 - 1).max(0));
+        let to_digit = |number: f64| (number / digit).round() * digit;
+        Some(if digit > 1.0 {
+            Estimate::new(to_digit(value), to_digit(se))
+        } else {
+            Self::interval(of)
+        })
+    }
+
     /// In a sentence.
     pub fn sentence(&self) -> String {
         let interval = |of: &Estimate| Self::interval(of).to_string();
@@ -61,17 +78,58 @@ impl Thermal {
         } else {
             String::new()
         };
+        let size = |of: &Estimate, unit: &str| match Self::size(of) {
+            Some(of) => format!("{of} {unit}"),
+            None => "not determined".to_owned(),
+        };
         format!(
-            "a thermal at ({}, {}) m at {:.0} s{moves}: {} m/s in the core, radius {} m, {} m³/s (95 %)",
+            "a thermal at ({}, {}) m at {:.0} s{moves}: in the core {}, radius {}, flux {} (± is the half width of a 95 % \
+             interval)",
             interval(x),
             interval(y),
             self.time_s,
-            interval(&self.peak_mps),
-            interval(&self.radius_m),
-            interval(&self.flux_m3ps)
+            size(&self.peak_mps, "m/s"),
+            size(&self.radius_m, "m"),
+            size(&self.flux_m3ps, "m³/s"),
         )
     }
 }
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn thermal(flux_m3ps: Estimate) -> Thermal {
+        let still = Estimate::new(0.0, 0.1);
+        Thermal {
+            time_s: 63.0,
+            core_m: [Estimate::new(0.2, 0.1), Estimate::new(-30.9, 0.5)],
+            drift_mps: [still; 2],
+            radius_m: Estimate::new(23.4446, 0.4517),
+            peak_mps: Estimate::new(1.8254, 0.031),
+            flux_m3ps,
+            sink: still,
+            log_odds: 9.0,
+        }
+    }
+
+    #[test]
+    fn it_is_told_in_digits_that_its_intervals_support() {
+        assert_eq!(
+            thermal(Estimate::new(2178.7, 110.5)).sentence(),
+            "a thermal at (0.20 ± 0.20, -30.90 ± 0.98) m at 63 s: in the core 1.825 ± 0.061 m/s, radius 23.44 ± 0.89 m, \
+             flux 2180 ± 220 m³/s (± is the half width of a 95 % interval)"
+        );
+    }
+
+    #[test]
+    fn a_size_within_its_error_is_not_determined() {
+        let words = thermal(Estimate::new(33_634.0, 35_256.0)).sentence();
+        assert!(words.contains("flux not determined (±"), "{words}");
+        assert!(!words.contains("33634"), "{words}");
+        assert_eq!(Thermal::size(&Estimate::new(0.5, f64::NAN)), None);
+    }
+}

@@ -14,6 +14,8 @@ use super::text::{
     NONE, clean, count, estimate, fixed, quantity, reduced, rejection, signed, symbol, unit, usable,
 };
 
+/// Cell of a number that the data do not determine.
+const UNKNOWN: &str = "not determined";
 /// A reduced chi² up to this needs no explanation.
 const GOOD_CHI2: f64 = 1.5;
 
@@ -79,7 +81,13 @@ fn significant(value: f64) -> String {
 
 /// A fit in one line: `A = 8.139 ± 0.012 µs/(m/s)², …`.
 pub(super) fn fit_line(fit: &Fit) -> String {
-    if let Some(beyond) = headline::beyond(fit) {
+    if let Some(edge) = fit.w_beyond_mps {
+        let Some(beyond) = headline::beyond(fit) else {
+            let edge = signed(edge, 0);
+            return format!(
+                "W*, A and u₀ not determined: the error of W* reaches beyond {edge} m/s"
+            );
+        };
         return format!("no minimum: W* {beyond} m/s, A and u₀ not determined");
     }
     let mut parts: Vec<String> = fit
@@ -110,12 +118,12 @@ pub(super) fn flock_lines(flight: &FlightAnalysis) -> Vec<(&'static str, String)
         return Vec::new();
     };
     [
-        (LawKind::SignedQuadratic.name(), &laws.signed_quadratic),
-        ("signed quadratic, held", &laws.signed_quadratic_held),
-        (LawKind::Linear.name(), &laws.linear),
+        (LawKind::SignedQuadratic.name(), laws.signed_quadratic.as_ref()),
+        ("signed quadratic, held", laws.of_own_vehicle()),
+        (LawKind::Linear.name(), laws.linear.as_ref()),
     ]
     .into_iter()
-    .filter_map(|(name, fit)| Some((name, fit_line(fit.as_ref()?))))
+    .filter_map(|(name, fit)| Some((name, fit_line(fit?))))
     .collect()
 }
 
@@ -279,8 +287,9 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         fit.and_then(|fit| fit.parameter(symbol)).map_or_else(
             || NONE.to_owned(),
             |p| {
-                if let Some(beyond) = fit.and_then(headline::beyond) {
-                    return if symbol == Symbol::W { beyond } else { NONE.to_owned() };
+                if let Some(fit) = fit.filter(|fit| fit.w_beyond_mps.is_some()) {
+                    let beyond = || headline::beyond(fit).unwrap_or_else(|| UNKNOWN.to_owned());
+                    return if symbol == Symbol::W { beyond() } else { NONE.to_owned() };
                 }
                 if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
             },
@@ -333,7 +342,7 @@ fn flags_of<'a>(drone: &DroneAnalysis, warnings: impl Iterator<Item = &'a Warnin
         format!("partial ladder ({}): not included in the fleet's numbers", partial.short())
     }));
     if let Some(laws) = &drone.laws {
-        let fits = [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear];
+        let fits = [laws.signed_quadratic.as_ref(), laws.of_own_vehicle(), laws.linear.as_ref()];
         for fit in fits.into_iter().flatten() {
             flags.extend(fit.warnings.iter().map(|warning| clean(&warning.to_string())));
             if !fit.other_minima.is_empty() {

@@ -2,6 +2,7 @@
 //! calibration.
 
 use crate::analysis::LawKind;
+use crate::analysis::law::Symbol;
 use crate::analysis::result::{BentLine, DroneAnalysis, Fit, FlightAnalysis, HeldCurve};
 use crate::base::estimate::Estimate;
 use crate::flight::Indicator;
@@ -86,9 +87,16 @@ pub(super) fn held_cell(drone: &DroneAnalysis) -> String {
     }
 }
 
+/// Nearer to the edge of what was searched, a fit's W is the edge, m/s: two steps of the search.
+const AT_EDGE_MPS: f64 = 0.1;
+
 /// Where a fit's W lies, if it ended at the edge of what was searched: `below −8`.
 pub(super) fn beyond(fit: &Fit) -> Option<String> {
     let edge = fit.w_beyond_mps?;
+    let w = fit.value(Symbol::W)?;
+    if (w - edge).abs() > AT_EDGE_MPS && w.abs() < edge.abs() {
+        return None;
+    }
     let word = if edge < 0.0 { "below" } else { "above" };
     Some(format!("{word} {}", signed(edge, 0)))
 }

@@ -27,9 +27,9 @@ pub(super) fn moving(drone: &DroneAnalysis) -> impl Iterator<Item = &WindowStats
     drone.windows.iter().filter(|window| window.kind.is_leg() && window.rejected.is_empty())
 }
 
-/// The signed-quadratic fit to show: with A and u0 held where it was made so.
+/// The signed-quadratic fit to show: with A and u0 held where it was made so, and they are of this vehicle.
 pub(super) fn signed_quadratic(laws: &Laws) -> Option<&Fit> {
-    laws.signed_quadratic_held.as_ref().or(laws.signed_quadratic.as_ref())
+    laws.of_own_vehicle().or(laws.signed_quadratic.as_ref())
 }
 
 /// The fit of a law to show; of the signed quadratic, [`signed_quadratic`].

@@ -103,9 +103,10 @@ pub(super) fn air_section(
     } else {
         Some("No drone gave an estimate of the vertical air speed.")
     };
+    let of_posterior = words::tells_scales(map);
     let statistics = flight.statistics.as_ref().map(|found| {
-        let correlations =
-            correlation::figure(flight, &key, found, format).map(|f| figures.show(f));
+        let correlations = correlation::figure(flight, &key, found, (format, of_posterior))
+            .map(|f| figures.show(f));
         let averaging = found
             .averaging
             .as_ref()
@@ -113,10 +114,10 @@ pub(super) fn air_section(
                 averaging::figure(flight, &key, averaging, found.baseline.as_ref(), format)
             })
             .map(|figure| figures.show(figure));
-        context! { correlations, averaging, ..scales::section(found) }
+        context! { correlations, averaging, ..scales::section(found, of_posterior) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, basemap => basemap.is_some() && flight.site.and_then(|site| site.origin_deg()).is_some(), mean, film => shown, explorer => explored, more, alone, posterior => words::sentences(map), statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, basemap => basemap.is_some() && flight.site.and_then(|site| site.origin_deg()).is_some(), mean, film => shown, explorer => explored, more, alone, posterior => words::sentences(map), has_posterior => map.posterior.is_some(), statistics, errors => errors::section(map) },
     )
 }
 

@@ -90,7 +90,9 @@ pub(super) fn flight_section(
     };
     let own: Vec<String> = own
         .into_iter()
-        .flat_map(|laws| [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear])
+        .flat_map(|laws| {
+            [laws.signed_quadratic.as_ref(), laws.of_own_vehicle(), laws.linear.as_ref()]
+        })
         .flatten()
         .map(fit_line)
         .collect();

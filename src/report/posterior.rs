@@ -16,6 +16,14 @@ pub(super) fn fleet(map: &UpdraftMap) -> Option<Estimate> {
     (usable(fleet.value) && usable(fleet.se)).then_some(fleet)
 }
 
+/// Whether the posterior tells the scales of the air, or why it has none: then no other scales are told as those of the
+/// air.
+pub(super) fn tells_scales(map: &UpdraftMap) -> bool {
+    let told =
+        |posterior: &PosteriorMap| posterior.scales.is_some() || posterior.no_scales.is_some();
+    map.posterior.as_ref().is_some_and(told)
+}
+
 /// `95 %: −0.16 to +0.02 m/s`
 pub(super) fn interval(of: Estimate) -> String {
     let decimals = of.decimals().unwrap_or(3);
@@ -24,8 +32,7 @@ pub(super) fn interval(of: Estimate) -> String {
 }
 
 /// Why there is none.
-const NO_POSTERIOR: &str = "No posterior map: it takes three drones that hover, and of all together 24 values that share no \
-                            second.";
+const NO_POSTERIOR: &str = "No posterior map: it takes three drones that hover, and 24 values in all that share no second.";
 
 /// The posterior in a headline; `None` without one.
 pub(super) fn headline(map: &UpdraftMap) -> Option<String> {
@@ -169,7 +176,10 @@ fn truth(map: &UpdraftMap, posterior: &PosteriorMap) -> Vec<String> {
             fixed(own / limit, 2),
         ));
         if let Some(se) = truth.limit_se_mps.filter(|se| usable(*se)) {
-            sentences.push(format!("That estimate knows the mean to {} m/s.", fixed(se, 3)));
+            sentences.push(format!(
+                "That estimate's own standard error of the mean over all drones and seconds is {} m/s.",
+                fixed(se, 3)
+            ));
         }
     }
     sentences
@@ -221,7 +231,7 @@ mod tests {
                  95 % intervals.",
                 "At one second in ten: rms error 0.052 m/s; the best linear estimate with the true covariances has \
                  0.050 m/s: ratio 1.04.",
-                "That estimate knows the mean to 0.047 m/s.",
+                "That estimate's own standard error of the mean over all drones and seconds is 0.047 m/s.",
             ]
         );
     }

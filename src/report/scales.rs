@@ -123,8 +123,40 @@ fn variant(of: &Variant) -> Value {
     }
 }
 
-/// What the page says about the statistics of a flight, apart from the figures.
-pub(super) fn section(of: &FieldStatistics) -> Value {
+/// What the page says about the statistics of a flight, apart from the figures. With `of_posterior`, the posterior tells
+/// the scales of the air, and those of the values of each drone alone are left to the numbers.
+pub(super) fn section(of: &FieldStatistics, of_posterior: bool) -> Value {
+    let record = &of.record;
+    context! {
+        of_posterior,
+        rows => if of_posterior { Vec::new() } else { rows(of) },
+        words => words(of, of_posterior),
+        variants => of
+            .variants
+            .iter()
+            .filter(|_| !of_posterior)
+            .map(variant)
+            .collect::<Vec<_>>(),
+        absent => of.absent.iter().map(|one| sentence(one)).collect::<Vec<_>>(),
+        simulated => of.simulated.as_ref().map(|simulated| sentence(&simulated.words)),
+        truth_known => of.true_air.as_ref().is_some_and(|air| air.field.is_some()),
+        record => (record.drones > 0).then(|| format!(
+            "{} over {} s, {} m to {} m apart; values are running means of {} s; their standard \
+             deviation over time is {} m/s, that of the fleet's mean {} m/s; {} % are missing",
+            count(record.drones, "drone"),
+            fixed(record.length_s, 0),
+            rounded(record.spacing_m),
+            rounded(record.extent_m),
+            fixed(record.running_mean_s, 0),
+            rounded(record.sd_mps),
+            rounded(record.common_sd_mps),
+            fixed(100.0 * record.missing_share, 1),
+        )),
+    }
+}
+
+/// The table of scales.
+fn rows(of: &FieldStatistics) -> Vec<Value> {
     let mut rows = Vec::new();
     let field = of.true_air.as_ref().and_then(|air| air.field);
     let lambda = field.map(|field| field.lambda_m);
@@ -173,6 +205,11 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
         let sd = field.map(|field| field.sd_mps);
         rows.push(row("σ of the air, maximum likelihood", "m/s", &model.sd_mps, sd, true));
     }
+    rows
+}
+
+/// The sentences below the table; with `of_posterior` without those about its scales.
+fn words(of: &FieldStatistics, of_posterior: bool) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut say = |words_of: &str| {
         if !words_of.trim().is_empty() {
@@ -182,19 +219,20 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
     if let Some(air) = &of.true_air {
         say(&true_air_words(air));
     }
-    if let Some(space) = &of.space {
+    if let Some(space) = of.space.as_ref().filter(|_| !of_posterior) {
         say(&space.words);
         if let Some(anisotropy) = &space.anisotropy {
             say(&anisotropy.words);
         }
     }
-    if let Some(time) = &of.time {
+    if let Some(time) = of.time.as_ref().filter(|_| !of_posterior) {
         say(&time.words);
         if let Some(half) = &time.half_record {
             say(&half.words);
         }
     }
-    for warning in of.likelihood.iter().flat_map(|model| &model.warnings) {
+    let model = of.likelihood.iter().filter(|_| !of_posterior);
+    for warning in model.flat_map(|model| &model.warnings) {
         say(warning);
     }
     if let Some(wind) = &of.wind {
@@ -203,27 +241,7 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
     if let Some(baseline) = &of.baseline {
         say(&baseline.words);
     }
-    let record = &of.record;
-    context! {
-        rows,
-        words,
-        variants => of.variants.iter().map(variant).collect::<Vec<_>>(),
-        absent => of.absent.iter().map(|one| sentence(one)).collect::<Vec<_>>(),
-        simulated => of.simulated.as_ref().map(|simulated| sentence(&simulated.words)),
-        truth_known => field.is_some(),
-        record => (record.drones > 0).then(|| format!(
-            "{} over {} s, {} m to {} m apart; values are running means of {} s; their standard \
-             deviation over time is {} m/s, that of the fleet's mean {} m/s; {} % are missing",
-            count(record.drones, "drone"),
-            fixed(record.length_s, 0),
-            rounded(record.spacing_m),
-            rounded(record.extent_m),
-            fixed(record.running_mean_s, 0),
-            rounded(record.sd_mps),
-            rounded(record.common_sd_mps),
-            fixed(100.0 * record.missing_share, 1),
-        )),
-    }
+    words
 }
 
 #[cfg(test)]

@@ -3,10 +3,16 @@
 use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{FieldStatistics, Scale};
 
+use super::posterior;
 use super::scales::{not_determined, true_air_words};
 use super::text::{clean, p_value};
 
-/// Length, time scale, and the two directions; or why there is nothing of the kind.
+/// Where the scales of values of each drone alone are, when the posterior tells those of the air.
+const ELSEWHERE: &str = "Correlations of each drone's values alone, over distance and over time, are in the report's figure, \
+                         and curves fitted to them in analysis.json.";
+
+/// Length, time scale, and the two directions; or why there is nothing of the kind. Beside the scales of a posterior,
+/// only where they are.
 pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
     let Some(statistics) = &flight.statistics else { return Vec::new() };
     let mut lines: Vec<String> = [length(statistics), time(statistics), directions(statistics)]
@@ -14,6 +20,10 @@ pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
         .flatten()
         .collect();
     let has_scales = !lines.is_empty();
+    // Two sets of scales with intervals would contradict each other: they are of different things.
+    if has_scales && flight.map.as_ref().is_some_and(posterior::tells_scales) {
+        lines = vec![ELSEWHERE.to_owned()];
+    }
     if !has_scales {
         lines.extend(statistics.absent.first().map(|reason| clean(reason)));
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, UpdraftMap};
+use crate::analysis::result::{Analysis, FlightAnalysis, LevelledMap, TruthCheck, UpdraftMap};
 use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
@@ -361,8 +361,7 @@ impl Output {
                 "  ",
                 &format!(
                     "against the truth: rms error of the 10 s values {} m/s{} (answering zero: \
-                     {}), bias {}, rms without it {}; {} % of {} values and {} % of {} means \
-                     inside their 95 % intervals",
+                     {}), bias {}, rms without it {}; {}",
                     fixed(truth.rms_mps, 3),
                     air.rms_error.map_or_else(String::new, |rms| {
                         format!(", of the drones' means {}", fixed(rms, 3))
@@ -370,10 +369,7 @@ impl Output {
                     fixed(truth.zero_rms_mps, 3),
                     signed(truth.bias_mps, 3),
                     fixed(truth.rms_without_bias_mps, 3),
-                    share(truth.inside_share),
-                    truth.values,
-                    share(truth.means_inside_share),
-                    truth.drones,
+                    inside(&truth),
                 ),
             );
         } else if let Some(rms) = air.rms_error {
@@ -466,6 +462,20 @@ impl Output {
     }
 }
 
+/// `95.3 % of 2544 values and 100.0 % of 16 means inside their 95 % intervals`
+fn inside(truth: &TruthCheck) -> String {
+    let values = format!("{} % of {} values", share(truth.inside_share), truth.values);
+    match (truth.drones, truth.means_inside_share) {
+        (1, Some(mean)) => {
+            let mean = if mean > 0.5 { "and so is the mean" } else { "but not the mean" };
+            format!("{values} inside their 95 % intervals, {mean}")
+        }
+        (n, means) => {
+            format!("{values} and {} % of {n} means inside their 95 % intervals", share(means))
+        }
+    }
+}
+
 fn style_of(value: f64, largest: f64) -> &'static str {
     if value > 0.25 * largest {
         RED
@@ -479,4 +489,24 @@ fn style_of(value: f64, largest: f64) -> &'static str {
 /// What of a row is shown.
 fn kept<T>(row: Vec<T>, shown: impl Fn(usize) -> bool) -> Vec<T> {
     row.into_iter().enumerate().filter(|(index, _)| shown(*index)).map(|(_, cell)| cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_mean_has_no_percentage() {
+        let truth = |drones: usize, means: f64| -> TruthCheck {
+            serde_json::from_value(serde_json::json!({
+                "drones": drones, "values": 90, "rms_mps": 0.1, "bias_mps": 0.0, "rms_without_bias_mps": 0.1,
+                "inside_share": 0.953, "means_inside_share": means,
+            }))
+            .unwrap()
+        };
+        let words = "95.3 % of 90 values and 50.0 % of 4 means inside their 95 % intervals";
+        assert_eq!(inside(&truth(4, 0.5)), words);
+        assert!(inside(&truth(1, 1.0)).ends_with("intervals, and so is the mean"));
+        assert!(inside(&truth(1, 0.0)).ends_with("intervals, but not the mean"));
+    }
 }

@@ -32,13 +32,12 @@ pub fn evaluate(study: &StudyPlan, seed: u64, flown: &Flown) -> Result<StudyResu
     let record = |index: usize| flown.records.get(index).and_then(Option::as_ref);
     let entries: Vec<Entry<'_>> =
         cells.iter().enumerate().map(|(index, cell)| (*cell, record(index))).collect();
-    let paper_way = FitOptions {
-        location: Location::Median,
-        weights: Weights::WindowSd,
-        ..FitOptions::default()
-    };
+    // Its tables are beside the paper's.
+    let own_way = FitOptions { wide_w_counts: true, ..FitOptions::default() };
+    let paper_way =
+        FitOptions { location: Location::Median, weights: Weights::WindowSd, ..own_way };
     let (paper_evaluation, paper_updrafts) = evaluation(study, &entries, flown, paper_way)?;
-    let (own_evaluation, own_updrafts) = evaluation(study, &entries, flown, FitOptions::default())?;
+    let (own_evaluation, own_updrafts) = evaluation(study, &entries, flown, own_way)?;
     let flights = entries
         .iter()
         .zip(paper_updrafts.iter().zip(&own_updrafts))

@@ -57,6 +57,9 @@ pub struct HeldCurve {
     /// Why there is no number, or what is doubtful about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doubt: Option<String>,
+    /// Whether the calibration is that of another vehicle: its law, held, tells no updraft either.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_other_vehicle: bool,
 }
 
 /// A calibration whose curve is held.
@@ -172,8 +175,11 @@ impl<'a> Holding<'a> {
             .collect();
         let flights = Flights { there: &there, here, sigmas: &self.sigmas, spread };
         let wind_mps = self.wind_mps(&there, here);
-        let slopes = slope_of(&there).zip(slope_of(here));
-        Some(self.words(here, shift(&flights)?, wind_mps, slopes))
+        let apart = Apart {
+            slopes: slope_of(&there).zip(slope_of(here)),
+            hover: hover_of(here).zip(hover_of(&there)).map(|(here, there)| here - there),
+        };
+        Some(self.words(here, shift(&flights)?, wind_mps, apart))
     }
 
     /// Standard error of the shift by wind: that the corrections are off by their doubt, or, where there are none,
@@ -190,13 +196,7 @@ impl<'a> Holding<'a> {
     }
 
     /// The result in its words.
-    fn words(
-        &self,
-        here: &[Point],
-        found: Shift,
-        wind_mps: f64,
-        slopes: Option<(f64, f64)>,
-    ) -> HeldCurve {
+    fn words(&self, here: &[Point], found: Shift, wind_mps: f64, apart: Apart) -> HeldCurve {
         let origin = self.origin.unwrap_or_default();
         let legs = || here.iter().filter(|point| point.is_leg);
         let [low, high] = found.speeds_mps;
@@ -207,15 +207,26 @@ impl<'a> Holding<'a> {
         let beyond = beyond_at(found.mean_mps);
         let few = legs().count().saturating_sub(beyond) < FEWEST_INSIDE;
         let stormy = wind_mps > MOST_WIND_MPS;
-        let other = slopes.filter(|(there, here)| {
+        let other = apart.slopes.filter(|(there, here)| {
             let steeper = here / there;
             !(MOST_STEEPER.recip()..=MOST_STEEPER).contains(&steeper)
         });
+        let unit = self.reference.indicator.unit();
+        let nowhere = found.is_open && beyond > 0 && beyond == legs().count();
         let doubt = if let Some((there, here)) = other {
-            let unit = self.reference.indicator.unit();
             Some(format!(
                 "W is not determined: over the ladder the indicator changes by {here:.1} {unit} per m/s and over the \
                  calibration by {there:.1}: this is the calibration of another vehicle"
+            ))
+        } else if nowhere {
+            let hover = apart.hover.map_or_else(String::new, |by| {
+                let word = if by > 0.0 { "higher" } else { "lower" };
+                format!(" (in hover the indicator is {:.0} {unit} {word})", by.abs())
+            });
+            Some(format!(
+                "W is not determined: no updraft within {:.0} m/s brings the ladder's windows onto the calibration's \
+                 curve{hover}: this seems to be the calibration of another vehicle",
+                shift::FASTEST_MPS
             ))
         } else if found.is_open {
             Some(format!(
@@ -269,8 +280,23 @@ impl<'a> Holding<'a> {
             speeds_mps: [low + origin.value, high + origin.value],
             chi2_reduced: found.chi2_reduced,
             doubt,
+            is_other_vehicle: other.is_some() || nowhere,
         }
     }
+}
+
+/// How a ladder differs from a calibration.
+#[derive(Clone, Copy)]
+struct Apart {
+    /// Slopes of lines through the legs, of the calibration and of the ladder, us/(m/s).
+    slopes: Option<(f64, f64)>,
+    /// Mean in hover, less that of the calibration, us.
+    hover: Option<f64>,
+}
+
+/// Mean pulse of the hovers, us.
+fn hover_of(points: &[Point]) -> Option<f64> {
+    mean(points.iter().filter(|point| !point.is_leg).map(|point| point.pulse_us))
 }
 
 /// Slope of a line through the legs; `None` with fewer than three.

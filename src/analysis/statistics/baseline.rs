@@ -89,16 +89,32 @@ pub(in crate::analysis) fn minutes(needed: &NeededAverage, is_open: bool) -> Str
     format!("{} min (95 %: {low} to {high})", digits(*minutes))
 }
 
+/// `14 min (95 %: 8 to 30) for 0.1 m/s, and 3.4 min (95 %: 2.1 to 7.6) for 0.2 m/s`.
+fn needed(one: &BaselineOf) -> String {
+    let is_told = |needed: &NeededAverage| !one.is_open || needed.interval_min.low >= SHORTEST_MIN;
+    if !one.needed.iter().any(is_told) {
+        let errors: Vec<String> =
+            one.needed.iter().map(|needed| format!("{} m/s", needed.error_mps)).collect();
+        return format!("a time that this record does not tell for {}", errors.join(" or "));
+    }
+    let mut text = String::new();
+    let mut before = false;
+    for needed in &one.needed {
+        let lead = if before { ", and " } else { "" };
+        // A bound that is too short for tenths of a minute follows from the one before: twice the error takes a
+        // quarter of the time.
+        let length = if before && !is_told(needed) {
+            "a quarter of that".to_owned()
+        } else {
+            minutes(needed, one.is_open)
+        };
+        let _ = write!(text, "{lead}{length} for {} m/s", needed.error_mps);
+        before = true;
+    }
+    text
+}
+
 fn sentence(found: &Baseline) -> String {
-    let of = |one: &BaselineOf| {
-        let mut text = String::new();
-        for (index, needed) in one.needed.iter().enumerate() {
-            let lead = if index > 0 { ", and " } else { "" };
-            let _ =
-                write!(text, "{lead}{} for {} m/s", minutes(needed, one.is_open), needed.error_mps);
-        }
-        text
-    };
     let drone = &found.drone;
     let Interval { low, high } = drone.integral_time_interval_s;
     let time = if drone.is_open {
@@ -109,11 +125,11 @@ fn sentence(found: &Baseline) -> String {
     let mut text = format!(
         "A drone's baseline needs {}: the mean over t has a standard error of σ √(2 T/t), in air of σ = {:.2} m/s \
          with an integral time T {time}",
-        of(drone),
+        needed(drone),
         drone.sd_mps
     );
     if let Some(fleet) = &found.fleet {
-        let _ = write!(text, "; the mean of all drones needs {}", of(fleet));
+        let _ = write!(text, "; the mean of all drones needs {}", needed(fleet));
     }
     let _ = write!(
         text,
@@ -167,6 +183,35 @@ mod tests {
         let gain = tenth.minutes / fleet_of.needed[0].minutes;
         assert!((4.0..20.0).contains(&gain), "nine drones in air of their own: {gain}");
         assert!(found.words.contains(" min (95 %: "), "{}", found.words);
+    }
+
+    #[test]
+    fn every_error_has_a_length_that_can_be_understood() {
+        let needed = |error_mps: f64, low: f64| NeededAverage {
+            error_mps,
+            minutes: 2.0 * low,
+            interval_min: Interval { low, high: f64::INFINITY },
+        };
+        let of = |low: f64| BaselineOf {
+            sd_mps: 0.1,
+            sd_interval_mps: Interval { low: 0.1, high: 0.1 },
+            integral_time_s: 90.0,
+            integral_time_interval_s: Interval { low: 45.0, high: f64::INFINITY },
+            is_open: true,
+            needed: vec![needed(0.1, low), needed(0.2, low / 4.0)],
+        };
+        assert_eq!(
+            super::needed(&of(2.0)),
+            "more than 2.0 min for 0.1 m/s, and more than 0.5 min for 0.2 m/s"
+        );
+        assert_eq!(
+            super::needed(&of(0.1)),
+            "more than 0.1 min for 0.1 m/s, and a quarter of that for 0.2 m/s"
+        );
+        assert_eq!(
+            super::needed(&of(0.01)),
+            "a time that this record does not tell for 0.1 m/s or 0.2 m/s"
+        );
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 
 use super::result::FieldRecord;
+use super::words;
 use crate::numeric::{self, Line, least};
 
 /// Shorter records say nothing about correlations, s: a few of the shortest time scales. Chosen.
@@ -87,24 +88,30 @@ impl Field {
         }
         if nowhere > 0 {
             notes.push(format!(
-                "{nowhere} drone(s) whose place is not known are not in the correlations (give the plan)"
+                "{} whose place is not known {} not in the correlations (give the plan)",
+                words::drones(nowhere),
+                words::are(nowhere)
             ));
         }
         if sparse > 0 {
             notes.push(format!(
-                "{sparse} drone(s) with values in less than half of the {seconds} s are not in the correlations"
+                "{} with values in less than half of the {seconds} s {} not in the correlations",
+                words::drones(sparse),
+                words::are(sparse)
             ));
         }
         if constant > 0 {
             notes.push(format!(
-                "{constant} drone(s) whose value never changes are not in the correlations"
+                "{} whose value never changes {} not in the correlations",
+                words::drones(constant),
+                words::are(constant)
             ));
         }
         if rows.len() < FEWEST_DRONES {
             return Err(format!(
-                "no correlations: {} drone(s) with a known place and a value that changes, and \
-                 {FEWEST_DRONES} are the least that could say anything",
-                rows.len()
+                "no correlations: {} with a known place and a value that changes, and {FEWEST_DRONES} are the least \
+                 that could say anything",
+                words::drones(rows.len())
             ));
         }
         let field = Self { places, rows, seconds, running: input.running_s.max(1) }.thinned(notes);

@@ -368,9 +368,11 @@ fn field_model(
     let blocks = estimators.blocks.as_ref();
     let drones = blocks.map_or(0, |blocks| blocks.drones.len());
     if drones < field.drones() {
+        let left = field.drones() - drones;
         warnings.push(format!(
-            "{} drone(s) with gaps are not in the likelihood",
-            field.drones() - drones
+            "{} with gaps {} not in the likelihood",
+            words::drones(left),
+            words::are(left)
         ));
     }
     FieldModel {

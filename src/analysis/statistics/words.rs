@@ -11,6 +11,16 @@ const STAYS: f64 = 0.85;
 /// p-values below this are called significant. Convention.
 const SIGNIFICANT: f64 = 0.05;
 
+/// `1 drone`, `4 drones`
+pub(super) fn drones(n: usize) -> String {
+    if n == 1 { "1 drone".to_owned() } else { format!("{n} drones") }
+}
+
+/// The verb of so many.
+pub(super) fn are(n: usize) -> &'static str {
+    if n == 1 { "is" } else { "are" }
+}
+
 /// What the simulated flights are.
 pub(super) fn simulated(flights: usize, model: &Fitted, record: &FieldRecord) -> String {
     format!(

@@ -28,21 +28,22 @@ const MOST_VIOLINS: usize = 60;
 /// Samples of a fitted curve.
 const CURVE: u32 = 80;
 
-/// The panels; `None` where there is neither a correlation over distance nor one over time.
+/// The panels; `None` where there is neither a correlation over distance nor one over time. Where the scales of the air
+/// are a posterior's (`of_posterior`), curves are drawn without their numbers.
 pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     statistics: &FieldStatistics,
-    format: Format,
+    (format, of_posterior): (Format, bool),
 ) -> Option<Figure> {
     let space = statistics.space.as_ref();
     let y = correlation_axis(statistics);
     let mut panels = Vec::new();
     if let Some(space) = space {
-        panels.push(distance_panel("(a) All pairs", &space.all, &y, ("λ", format)));
+        panels.push(distance_panel("(a) All pairs", &space.all, &y, ("λ", format, of_posterior)));
     }
     if let Some(time) = &statistics.time {
-        panels.push(time_panel(time, &y));
+        panels.push(time_panel(time, &y, of_posterior));
     }
     if let Some(space) = space {
         for (name, symbol, one) in [
@@ -50,7 +51,7 @@ pub(in crate::report) fn figure(
             ("(d) Pairs along y (left)", "λy", &space.along_y),
         ] {
             if let Some(one) = one {
-                panels.push(distance_panel(name, one, &y, (symbol, format)));
+                panels.push(distance_panel(name, one, &y, (symbol, format, of_posterior)));
             }
         }
     }
@@ -67,19 +68,26 @@ pub(in crate::report) fn figure(
     let name = format!("fig6-{key}");
     let title =
         format!("Correlations of the vertical air speed, {} (paper's Fig. 6)", clean(&flight.name));
+    let errors = if of_posterior {
+        "The curves describe values of single drones: the scales of the air are told beside the map, \
+         and the numbers of these fits are in analysis.json."
+    } else {
+        "The ± in the legend is the error of the curve fit, as \
+         in the paper; the interval below it is the one that holds the truth in 95 of 100 \
+         flights in such air."
+    };
     Some(Figure {
         svg: sheet.svg(&name, &title),
         name,
         title,
-        caption: "(a), (c), (d) Correlation of every pair of drones, gathered by \
+        caption: format!(
+            "(a), (c), (d) Correlation of every pair of drones, gathered by \
                   nominal distance: the shape is their distribution, lines are the lowest, the \
                   highest and (wide) the median, the short dark bar is the mean; dashed red: exp(−r/λ) fitted \
                   to the medians; dotted grey: the paper's. (b) Autocorrelation, mean of the drones \
                   with a band of one standard deviation between them; dashed red: A (Δt − t₀), \
-                  fitted up to the first zero. The ± in the legend is the error of the curve fit, as \
-                  in the paper; the interval below it is the one that holds the truth in 95 of 100 \
-                  flights in such air."
-            .to_owned(),
+                  fitted up to the first zero. {errors}"
+        ),
     })
 }
 
@@ -106,7 +114,7 @@ fn distance_panel(
     title: &str,
     of: &DistanceCorrelation,
     y: &Axis,
-    (symbol, format): (&str, Format),
+    (symbol, format, of_posterior): (&str, Format, bool),
 ) -> Panel {
     let farthest = of.classes.iter().map(|class| class.distance_m);
     let mut x = Axis::around("distance between drones (m)", farthest.chain([0.0]), 1.0);
@@ -142,19 +150,28 @@ fn distance_panel(
             panel.line(&curve(paper.value), MUTED, 1.3, "2 3");
         }
         panel.line(&curve(lambda.value), VERMILLION, 1.8, "6 4");
-        scale_entries(&mut panel, symbol, lambda, "m");
+        scale_entries(&mut panel, symbol, lambda, ("m", of_posterior));
     }
     panel
 }
 
-/// The legend of a scale: the paper's form, the honest interval, the paper's value.
-fn scale_entries(panel: &mut Panel, symbol: &str, scale: &Scale, unit: &str) {
+/// The legend of a scale: the paper's form, the honest interval, the paper's value; of a curve beside a posterior's scales
+/// that it is a fit.
+fn scale_entries(
+    panel: &mut Panel,
+    symbol: &str,
+    scale: &Scale,
+    (unit, of_posterior): (&str, bool),
+) {
     let text = match not_determined(scale, unit) {
+        _ if of_posterior => format!("curve fit for {symbol}"),
         Some(words) => format!("{symbol} {words}"),
         None => format!("{symbol} = {} {unit} (curve fit)", paper_form(scale)),
     };
     panel.entry(&text, VERMILLION, LegendShape::Line, "6 4");
-    if let Some(honest) = scale.interval_95.filter(|_| scale.undetermined.is_none()) {
+    if let Some(honest) =
+        scale.interval_95.filter(|_| scale.undetermined.is_none() && !of_posterior)
+    {
         let text = format!("95 %: {} {unit}", interval(honest));
         panel.entry(&text, "#ffffff", LegendShape::Line, "");
     }
@@ -233,7 +250,7 @@ fn outline(class: &DistanceClass, half: f64) -> Option<Vec<(f64, f64)>> {
     Some(side(1.0).chain(side(-1.0).rev()).collect())
 }
 
-fn time_panel(time: &TimeCorrelation, y: &Axis) -> Panel {
+fn time_panel(time: &TimeCorrelation, y: &Axis, of_posterior: bool) -> Panel {
     let reach = time.lag_s.iter().copied().chain([0.0]);
     let mut x = Axis::around("lag Δt (s)", reach, 10.0);
     x.min = 0.0;
@@ -256,7 +273,7 @@ fn time_panel(time: &TimeCorrelation, y: &Axis) -> Panel {
         let (t0, slope) = (line.t0_s.value, line.slope_per_s.value);
         let start = (t0 + y.max / slope).max(0.0);
         panel.line(&[(start, slope * (start - t0)), (t0, 0.0)], VERMILLION, 1.8, "6 4");
-        scale_entries(&mut panel, "t₀", &line.t0_s, "s");
+        scale_entries(&mut panel, "t₀", &line.t0_s, ("s", of_posterior));
     }
     panel
 }

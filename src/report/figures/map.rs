@@ -146,7 +146,7 @@ pub(in crate::report) fn mean_map(
     if positions.is_empty() {
         return None;
     }
-    let filled: Vec<(&FilledDrone, f64)> = match (&map.posterior, means) {
+    let filled: Vec<(&FilledDrone, Estimate)> = match (&map.posterior, means) {
         (Some(posterior), Means::Posterior) => posterior.filled.iter().filter_map(filled).collect(),
         _ => Vec::new(),
     };
@@ -274,16 +274,20 @@ pub(in crate::report) fn mean_map(
         }
         (Means::Posterior, _) => (
             ", as all drones, seconds and the calibration together tell it",
-            " Dotted frames are drones without values of their own, whose air their neighbours tell: \
-             updraft.csv among the fields has its standard error for each second.",
+            " Dotted frames are drones without values of their own, whose air their neighbours tell; the error below is \
+             the mean one of their seconds, which updraft.csv among the fields has.",
         ),
+    };
+    let more = match filled.len() {
+        0 => String::new(),
+        n => format!(" and each of {} without a log", count(n, "place")),
     };
     Some(Figure {
         svg: drawing.finish(&title),
         name,
         title,
         caption: format!(
-            "The grid seen from above, one square for each of {}: the mean vertical air speed \
+            "The grid seen from above, one square for each of {}{more}: the mean vertical air speed \
              over the hover{what}{numbers}. Red is rising air, blue sinking, white none.{beside}{lost}{dashed}{}",
             count(positions.len() - empty.len() - filled.len(), "drone"),
             ground_words(flight, basemap),
@@ -300,7 +304,7 @@ pub(in crate::report) fn scale_of(map: &UpdraftMap, means: Means) -> f64 {
         map.drones
             .iter()
             .map(|drone| means.of(drone).value)
-            .chain(filled.map(|(_, mean)| mean))
+            .chain(filled.map(|(_, mean)| mean.value))
             .chain(map.drones.iter().filter_map(mean_truth)),
     )
 }
@@ -348,38 +352,46 @@ fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], 
     drawing.close();
 }
 
-/// A drone without a log, with the mean of its posterior over time.
-fn filled(drone: &FilledDrone) -> Option<(&FilledDrone, f64)> {
+/// A drone without a log, with the mean of its posterior over time. Its error is the mean one of the seconds: as if
+/// all were off alike, which that of the mean does not exceed.
+fn filled(drone: &FilledDrone) -> Option<(&FilledDrone, Estimate)> {
     let known = drone.posterior_mps.iter().flatten().copied();
+    let se = mean(drone.posterior_sd_mps.iter().flatten().copied()).unwrap_or(f64::NAN);
     let [x, y] = drone.position_m;
-    Some((drone, mean(known).filter(|_| usable(x) && usable(y))?))
+    let mean = mean(known).filter(|_| usable(x) && usable(y))?;
+    Some((drone, Estimate::new(mean, se)))
 }
 
 fn filled_cell(
     drawing: &mut Drawing,
     drone: &FilledDrone,
-    mean: f64,
+    mean: Estimate,
     [x, y, w, h]: [f64; 4],
     limit: f64,
     text: Room,
 ) {
-    let place = mean / limit;
+    let place = mean.value / limit;
     let label = drone.slot.to_string();
-    drawing.open(&format!("slot {label}: {} m/s, by its neighbours", signed(mean, 3)));
+    drawing.open(&format!("slot {label}: {} m/s, by its neighbours", estimate(mean)));
     let frame = format!("rx=\"2\" stroke=\"{INK}\" stroke-dasharray=\"2 3\"");
     drawing.rect([x + 2.0, y + 2.0, w - 4.0, h - 4.0], &diverging(place), &frame);
     if let Some(decimals) = text.decimals {
         let colour = ink_on_diverging(place);
         let style = |size, bold, anchor| TextStyle { size, bold, colour, anchor };
         let middle = [x + w / 2.0, y + h * 0.56];
-        let value = signed(mean, decimals);
+        let value = signed(mean.value, decimals);
         drawing.text(middle, &value, style((w * 0.23).min(20.0), true, Anchor::Middle), 0.0);
         if !text.all {
             drawing.close();
             return;
         }
         let below = [x + w / 2.0, y + h * 0.79];
-        drawing.text(below, "no log", style((w * 0.155).min(13.0), false, Anchor::Middle), 0.0);
+        let error = if usable(mean.se) && mean.se > 0.0 {
+            format!("±{}", fixed(mean.se, decimals))
+        } else {
+            "no log".to_owned()
+        };
+        drawing.text(below, &error, style((w * 0.155).min(13.0), false, Anchor::Middle), 0.0);
         let corner = [x + w * 0.07, y + h * 0.2];
         drawing.text(corner, &label, style((w * 0.13).min(10.0), false, Anchor::Start), 0.0);
     }

@@ -113,12 +113,18 @@ pub(super) fn air_sentences(flight: &FlightAnalysis, several: bool) -> Vec<Strin
         let n = map.thermals.len();
         let them = if n == 1 { "A thermal was".to_owned() } else { format!("{n} thermals were") };
         let which = if n == 1 { "" } else { ", the most certain one" };
+        let peak = Thermal::size(&thermal.peak_mps).map_or_else(
+            || "its strength is not determined".to_owned(),
+            |peak| format!("{} m/s more in the core than around it", estimate(peak)),
+        );
+        let radius = Thermal::size(&thermal.radius_m).map_or_else(
+            || "its radius is not determined".to_owned(),
+            |radius| format!("{} m in radius", estimate(radius)),
+        );
         format!(
-            "{them} found{which}{} at {}: {} m/s more in the core than around it, {} m in radius (95 %).",
+            "{them} found{which}{} at {}: {peak}, {radius} (± is the half width of a 95 % interval).",
             of_core(flight, thermal),
             moment(when(flight), thermal.time_s),
-            estimate(Thermal::interval(&thermal.peak_mps)),
-            estimate(Thermal::interval(&thermal.radius_m)),
         )
     }));
     said.push(wind_sentence(flight.statistics.as_ref().and_then(|found| found.wind.as_ref())));
@@ -241,7 +247,7 @@ fn slope_sentence(flight: &FlightAnalysis) -> Option<String> {
     }
     let laws = law::flight_laws(flight)?;
     let kind = headline::preferred(flight).or_else(|| crate::analysis::prefer::better_of(laws))?;
-    let fit = law::fit_of(laws, kind)?;
+    let fit = law::fit_of(laws, kind).filter(|fit| fit.w_beyond_mps.is_none())?;
     match kind {
         LawKind::Linear => Some(format!(
             "The effort changes by {} {effort} for each m/s of vertical speed through the air.",

@@ -69,7 +69,12 @@ pub(in crate::workflow) fn doubts_of_held(
             indicator.words()
         ));
     }
-    for flight in work.flights.iter().filter(|one| one.purpose != Some(Purpose::Calibration)) {
+    let measures = |one: &&Found| one.purpose != Some(Purpose::Calibration);
+    let is_ladder = |one: &&Found| !measures(one) && !one.logs.is_empty();
+    // Laws measure the air of the other flights, and where there are none, that of a ladder.
+    let with_map = work.flights.iter().any(|one| measures(&one));
+    let judged = |one: &&Found| if with_map { measures(one) } else { is_ladder(one) };
+    for flight in work.flights.iter().filter(judged) {
         let Some(plan) = &flight.plan else { continue };
         reasons.extend(other_slots(reference, plan));
         if let Some((planned, seed)) = &calibrated {
@@ -78,9 +83,10 @@ pub(in crate::workflow) fn doubts_of_held(
     }
     reasons.dedup();
     (!reasons.is_empty()).then(|| {
+        let what = if with_map { "the map" } else { "the updraft" };
         format!(
             "the laws of {} seem to be those of other drones: {}. Each drone has its own law; with \
-             another fleet's laws the map is wrong by as much as the fleets differ, which the \
+             another fleet's laws {what} is wrong by as much as the fleets differ, which the \
              stated errors do not include. Use the laws of a calibration of these drones",
             path.shown(),
             reasons.join("; ")

@@ -107,7 +107,7 @@ fn each_campaign_has_its_own_calibration() {
     let means = |args: &[&str]| -> Vec<(String, f64)> {
         let ended = analyze(bench, 0, &[args, &["--json"]].concat());
         let found: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
-        let flights = found["flights"].as_array().unwrap().iter();
+        let flights = found["analysis"]["flights"].as_array().unwrap().iter();
         flights
             .filter_map(|flight| {
                 let mean = flight["map"]["drones"][0]["mean"]["value"].as_f64()?;
@@ -120,6 +120,42 @@ fn each_campaign_has_its_own_calibration() {
     assert_eq!(together.len(), 2, "{together:?}");
     for ((_, alone), (name, together)) in alone.iter().flatten().zip(&together) {
         assert!((alone - together).abs() < 1e-12, "{name}: {together} instead of {alone}");
+    }
+}
+
+#[test]
+fn laws_of_other_drones_are_doubted_for_a_ladder_alone() {
+    let bench = flown();
+    let other = Bench::new();
+    fly(&other, "campaign", &["--seed", "5", "--vehicle", "airsim-generic-quad"]);
+    let laws = other.path("campaign/analysis.json");
+    let hold = ["campaign/calibration", "--hold", laws.to_str().unwrap()];
+    let held = analyze(bench, 0, &hold);
+    let told = held.out.split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in [
+        "seem to be those of other drones: they flew airsim-generic-quad, and calibration flew pixel; they were \
+         simulated with seed 5, and calibration with seed 1: other drones",
+        "with another fleet's laws the updraft is wrong",
+        // And what the windows themselves say.
+        "no updraft within 8 m/s brings the ladder's windows onto the calibration's curve",
+        "this seems to be the calibration of another vehicle",
+    ] {
+        assert!(told.contains(words), "{words}: {held}");
+    }
+    assert!(!told.contains("A and u0 held"), "no W* by the law of another vehicle: {held}");
+    let json = analyze(bench, 0, &[&hold[..], &["--json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(json["analysis"]["warnings"].as_array().unwrap().len(), 1, "{json}");
+
+    // The same drones' own calibration, and their ladder on another day.
+    let again = Bench::new();
+    fly(&again, "campaign", &[]);
+    let own = bench.path("campaign/analysis.json");
+    for bench in [bench, &again] {
+        let held = ["campaign/calibration", "--hold", own.to_str().unwrap()];
+        let held = analyze(bench, 0, &held);
+        assert!(!held.out.contains("those of other drones"), "{held}");
+        assert!(!held.out.contains("another vehicle"), "{held}");
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::report::synthetic::{calibration, campaign, provenance, updraft_series, whole_campaign};
+use crate::report::synthetic::{
+    calibration, campaign, posterior, provenance, updraft_series, whole_campaign,
+};
 use updraft::analysis::law::Symbol;
 use updraft::analysis::result::{Analysis, TableRow};
 use updraft::analysis::table::{Quantity, TableLaw};
@@ -134,6 +136,51 @@ fn a_field_campaign_has_the_papers_figures_with_honest_errors() {
     assert_eq!(fleet.matches("<a href=\"fig3-calibration-").count(), 45, "each drone is a link");
     assert_eq!(fleet.matches("no log</text>").count(), 4);
     assert!(report.html.contains("<a href=\"figures/fig3-calibration-1-drone-1.svg\""));
+}
+
+#[test]
+fn beside_the_scales_of_a_posterior_there_are_no_others() {
+    let mut analysis = posterior(whole_campaign());
+    let told = |analysis: &Analysis| {
+        let terminal = terminal_summary(analysis, 200, false);
+        (made(analysis).html.replace("&#x2f;", "/"), terminal)
+    };
+    // As of the values alone: 98.2 m (95 %: 39.3 to 403 m), and how they differ by direction.
+    let (page, terminal) = told(&analysis);
+    assert!(page.contains("39.3 to 403") && page.contains("along x and y differ"));
+    assert!(terminal.contains("correlation length λ 98.2 m (95 %: 39.3 to 403 m"), "{terminal}");
+    let found = analysis.flights[1].map.as_mut().unwrap().posterior.as_mut().unwrap();
+    found.no_scales = Some("a passing thermal has no correlation length".to_owned());
+    let (page, terminal) = told(&analysis);
+    for said in [&page, &terminal] {
+        assert!(said.contains("a passing thermal has no correlation length"), "{said}");
+        for other in ["39.3 to 403", "along x and y differ", "made by the length"] {
+            assert!(!said.contains(other), "{other} beside the posterior's scales");
+        }
+        assert!(said.contains("analysis.json"), "where the others are");
+    }
+    assert!(!terminal.contains("correlation length λ"), "{terminal}");
+    let figure = made(&analysis);
+    let figure = figure.figures.iter().find(|(name, _)| name == "fig6-hover").unwrap();
+    assert!(figure.1.contains("curve fit for λx"), "the curves are still drawn");
+    // What is no scale of the air stays.
+    assert!(page.contains("2.4 ± 0.2 m/s from 240°"), "the wind");
+}
+
+#[test]
+fn what_a_posterior_shows_is_not_called_an_estimate_of_single_drones() {
+    let report = made(&posterior(whole_campaign()));
+    let page = report.html.replace("&#x2f;", "/");
+    assert!(page.contains("estimated − true W (m/s)") && page.contains("Posterior W − W"));
+    assert!(!page.contains(">W* − W (m/s)<") && !page.contains(">W* and W (m/s, up positive)<"));
+    // The lost drone's square has its error, and is counted as what it is.
+    let (_, figure) = report.figures.iter().find(|(name, _)| name == "posterior-hover").unwrap();
+    assert!(figure.contains("0.25 ± 0.10") && figure.contains("by its neighbours"));
+    assert!(!figure.contains(">no log<"), "the error of a filled square stands there");
+    assert!(page.contains("drones and each of 1 place without a log: the mean"), "its caption");
+    // Each drone alone is as it was.
+    let page = made(&whole_campaign()).html.replace("&#x2f;", "/");
+    assert!(page.contains(">W* − W (m/s)<") && page.contains(">W* and W (m/s, up positive)<"));
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use crate::report::synthetic::{campaign, provenance, updraft_series};
 use updraft::analysis::Warning;
-use updraft::analysis::result::{Analysis, FlightAnalysis};
+use updraft::analysis::result::{Analysis, FlightAnalysis, HeldCurve};
+use updraft::base::estimate::Estimate;
 use updraft::report::{render, terminal_summary};
 
 #[test]
@@ -128,6 +129,52 @@ fn a_w_at_its_bound_is_no_number() {
         assert!(!said.contains("7.987"), "{said}");
     }
     assert!(text.contains("A and u₀ not determined"), "{text}");
+}
+
+#[test]
+fn a_w_whose_error_reaches_the_bound_is_no_number() {
+    let mut analysis = campaign();
+    let flight = &mut analysis.flights[0];
+    let laws = flight.drones.iter_mut().filter_map(|drone| drone.laws.as_mut());
+    for laws in laws.chain(flight.flock.as_mut()) {
+        let fit = laws.signed_quadratic.as_mut().unwrap();
+        fit.parameters[2].estimate = Estimate::new(-6.321, 1.9);
+        fit.w_beyond_mps = Some(-8.0);
+    }
+    let text = terminal_summary(&analysis, 200, false);
+    let page = render(&analysis, &provenance()).unwrap().html;
+    for said in [&text, &page] {
+        assert!(said.contains("not determined") && !said.contains("6.3 ± 1.9"), "{said}");
+        assert!(!said.contains("below −8"), "it ended within: {said}");
+    }
+    assert!(text.contains("W*, A and u₀ not determined: the error of W*"), "{text}");
+}
+
+#[test]
+fn laws_of_another_vehicle_tell_no_updraft() {
+    let mut analysis = campaign();
+    let flight = &mut analysis.flights[0];
+    let held = serde_json::json!({
+        "updraft": null, "legs": 14, "beyond": 14, "speeds_mps": [-3.5, 3.5],
+        "doubt": "W is not determined: this seems to be the calibration of another vehicle",
+    });
+    let told = |analysis: &Analysis| terminal_summary(analysis, 200, false);
+    let set = |flight: &mut FlightAnalysis, is_other: bool| {
+        let laws = flight.drones.iter_mut().filter_map(|drone| drone.laws.as_mut());
+        for laws in laws.chain(flight.flock.as_mut()) {
+            let mut fit = laws.signed_quadratic.clone().unwrap();
+            fit.parameters[2].estimate = Estimate::new(1.7161, 0.0692);
+            laws.signed_quadratic_held = Some(fit);
+            let mut curve: HeldCurve = serde_json::from_value(held.clone()).unwrap();
+            curve.is_other_vehicle = is_other;
+            laws.held = Some(curve);
+        }
+    };
+    set(flight, false);
+    assert!(told(&analysis).contains("1.716 ± 0.069"));
+    set(&mut analysis.flights[0], true);
+    let text = told(&analysis);
+    assert!(!text.contains("1.716") && text.contains("another vehicle"), "{text}");
 }
 
 #[test]
