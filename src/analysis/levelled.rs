@@ -137,7 +137,10 @@ pub(super) fn measure(
         .filter_map(|doubt| Moments::of(in_stretch(doubt)).and_then(|moments| moments.variance()));
     let noise_mps = (white_mps * white_mps + doubted.sum::<f64>()).sqrt();
     let gain = if sd_mps > 0.0 { (1.0 - (noise_mps / sd_mps).powi(2)).max(0.0) } else { 0.0 };
-    let zero_length_s = level.zero_s.map(|[from, to]| to - from);
+    // Seconds without a value tell nothing of the zero.
+    let silent = found.values_mps.iter().enumerate();
+    let silent = silent.filter(|(index, value)| stretch(*index) && value.is_none()).count();
+    let zero_length_s = level.zero_s.map(|[from, to]| (to - from - silent as f64).max(RUNNING_S));
     let level_se_mps = match (zero_length_s, found.level_se) {
         (Some(length_s), _) => steady.map_or(sd_mps, |steady| steady.error_mps(length_s)),
         (None, Some(level_se)) => {
@@ -357,12 +360,13 @@ pub(super) fn of_map(
         .filter_map(|(one, truth)| Some((*one, one.levelled.as_deref()?, truth.as_ref())))
         .collect();
     let first = known.first()?.1;
-    Some(LevelledMap {
+    let levelled = LevelledMap {
         response: first.response.clone(),
         zero_s: first.zero_s,
         drones: known.iter().map(|(_, one, _)| one.level.clone()).collect(),
-        held_out: held_out(&known),
-    })
+        held_out: None,
+    };
+    Some(LevelledMap { held_out: held_out(&known, &levelled), ..levelled })
 }
 
 /// One value outside of the zero stretch.
@@ -376,7 +380,10 @@ struct Compared {
     is_apart: bool,
 }
 
-fn held_out(drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)]) -> Option<HeldOut> {
+fn held_out(
+    drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)],
+    map: &LevelledMap,
+) -> Option<HeldOut> {
     let mut all: Vec<Compared> = Vec::new();
     for (series, levelled, truth) in drones {
         let (Some(truth), Some(measured)) = (truth, series.measured.as_ref()) else { continue };
@@ -384,9 +391,7 @@ fn held_out(drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)]) -> Optio
         for (index, estimate) in series.updraft_mps.iter().enumerate() {
             let second = series.first_s + index as i64;
             let time_s = second as f64;
-            let outside = levelled
-                .zero_s
-                .is_none_or(|[from, to]| time_s - HALF_S >= to || time_s + HALF_S <= from);
+            let outside = map.is_outside(time_s);
             let value = (|| {
                 let [low, high] = measured.interval_mps.get(index).copied().flatten()?;
                 let half = 0.5 * (high - low);
