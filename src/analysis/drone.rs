@@ -2,6 +2,7 @@
 
 use super::aware::Aware;
 use super::beside::Beside;
+use super::budget::QualityFlag;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
 use super::corrections::Corrections;
@@ -28,6 +29,9 @@ use crate::base::causes::with_causes;
 use crate::base::plain::{Shown as _, plain};
 use crate::flight::{Alignment, Flight, FlightOptions, Loss, Series, table};
 use crate::mission::plan::{Purpose, Segment, Slot};
+
+/// Stretches without values that are told one by one.
+const MOST_STRETCHES: usize = 4;
 
 /// What all logs of a flight share.
 pub(super) struct Shared<'a> {
@@ -151,6 +155,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         warnings.extend(truth.as_ref().and_then(truth_in_part));
         if input.level.is_some() {
             warnings.extend(shorter_hovers(&of_air));
+            warnings.extend(silent_stretches(&measured.quality));
         }
     }
     let source = input.shown(&log.path);
@@ -217,6 +222,22 @@ fn truth_in_part(truth: &TruthSeries) -> Option<Warning> {
         );
         Warning::Log(text.into())
     })
+}
+
+/// The stretches of a hover that have no value, with the reason of each.
+fn silent_stretches(quality: &[QualityFlag]) -> Option<Warning> {
+    let all: Vec<&str> = quality
+        .iter()
+        .filter(|flag| flag.flag.excludes())
+        .map(|flag| flag.reason.as_str())
+        .collect();
+    let more = match all.len().saturating_sub(MOST_STRETCHES) {
+        0 => String::new(),
+        more => format!("; {more} more stretches are in the report"),
+    };
+    let told: Vec<&str> = all.iter().take(MOST_STRETCHES).copied().collect();
+    let text = format!("hover: {}{more}", told.join("; "));
+    (!all.is_empty()).then(|| Warning::Log(text.into()))
 }
 
 /// That a map is of the longest hover alone, where there are others that could have values.

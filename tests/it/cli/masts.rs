@@ -246,6 +246,8 @@ fn a_hole_in_the_table_costs_its_own_seconds_alone() {
     let values = flight["map"]["drones"][0]["updraft_mps"].as_array().unwrap();
     let silent = values.iter().filter(|value| value.is_null()).count();
     assert!((60..=72).contains(&silent), "{silent} s");
+    let said = said(&holed, &ZERO);
+    assert!(said.contains("hover: the log has a gap: no values from"), "{said}");
 }
 
 #[test]
