@@ -241,8 +241,6 @@ fn a_hole_in_the_table_costs_its_own_seconds_alone() {
         of(&flight)["held_out"]["running"]["values"],
         of(&whole)["held_out"]["running"]["values"]
     );
-    let error = |flight: &Value| number(&of(flight)["drones"][0]["level_se_mps"]);
-    assert!(error(&flight) > error(&whole), "less of the air is known");
     let values = flight["map"]["drones"][0]["updraft_mps"].as_array().unwrap();
     let silent = values.iter().filter(|value| value.is_null()).count();
     assert!((60..=72).contains(&silent), "{silent} s");
@@ -260,7 +258,11 @@ fn the_page_says_what_the_terminal_says() {
     let page = fs::read_to_string(bench.path("out/report/index.html")).unwrap();
     // The wind of the leans, the interval, and an error that the asked-for zero is not in.
     assert!(told.contains("m/s of wind that the leans show"), "{told}");
-    for words in ["as the vehicle's drag is not", "as the vehicle&#x27;s drag is not"] {
+    for words in [
+        "as the vehicle's drag is not",
+        "as the vehicle&#x27;s drag is not",
+        "as the vehicle’s drag is not",
+    ] {
         assert!(!page.contains(words), "{words}");
     }
     assert!(page.contains("The wind was ") && page.contains("by the lean of the drones"));
