@@ -222,12 +222,14 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
     let broken =
         |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
     let heads = reader.headers().map_err(broken)?.clone();
+    // Where lines end with CR and LF, the reader counts a line only when it goes on behind the CR.
+    let lines_before = before + u64::from(reader.position().line() < 2);
     let table = Places::of(&heads, path, wish)?;
     let mut rows = Rows {
         path,
         time: wish.time,
         table,
-        lines_before: before,
+        lines_before,
         first: None,
         start: None,
         last_s: f64::NEG_INFINITY,
@@ -238,7 +240,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
     let mut cut_off: Option<TableError> = None;
     while rows.taken < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
         since_row.set(0);
-        let line = row.position().map_or(0, csv::Position::line) + before;
+        let line = row.position().map_or(0, csv::Position::line) + lines_before;
         if line < wish.first_line {
             continue;
         }
