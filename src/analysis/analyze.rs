@@ -38,6 +38,7 @@ use super::site::FlightSite;
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
 use super::statistics::result::{FieldStatistics, TiltWind};
+use super::statistics::tilt_wind::LeanDrag;
 use super::table::{self, PaperTable, TableLaw};
 use super::track;
 use super::truth;
@@ -575,9 +576,12 @@ fn statistics(
     seen: &[HoverSeen],
 ) -> Option<FieldStatistics> {
     let Shared { input, options, .. } = shared;
+    // The wind by which a response was steepened is that of its own leans.
+    let leans = input.level.and_then(|level| level.response.as_ref()?.leans());
+    let drag = leans.as_ref().map_or_else(|| shared.drag(), LeanDrag::Table);
     (!map.is_scan()).then(|| FieldStatistics {
         true_air: input.true_air.cloned(),
-        ..of_map(map, seen, &options.statistics, shared.drag())
+        ..of_map(map, seen, &options.statistics, drag)
     })
 }
 
@@ -696,7 +700,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
     let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
     let times = updraft::common_times(&series);
     let truth_of = |slot: Option<u16>, own: Option<TruthSeries>| match (uniform_mps, own) {
-        (Some(truth_mps), _) => Some(vec![truth_mps; times.len()]),
+        (Some(truth_mps), _) => Some(vec![Some(truth_mps); times.len()]),
         (None, Some(own)) => own.at(&times),
         (None, None) => shared.input.truth?.get(&slot?)?.at(&times),
     };
@@ -764,7 +768,10 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> (UpdraftMap, Vec<Opt
         battery: aware.and_then(|aware| aware.battery),
         calibration_air: aware.map(|aware| aware.zero.air),
         common: aware.map(|aware| aware.common(&measured)),
-        truth: truth::check(&drones),
+        truth: match &levelled {
+            Some(levelled) => truth::check_levelled(&drones, levelled, &times),
+            None => truth::check(&drones),
+        },
         levelled,
         combined: None,
         drones,

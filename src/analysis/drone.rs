@@ -2,6 +2,7 @@
 
 use super::aware::Aware;
 use super::beside::Beside;
+use super::budget::QualityFlag;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
 use super::corrections::Corrections;
@@ -15,10 +16,10 @@ use super::offset::OffsetMap;
 use super::options::AnalysisOptions;
 use super::reference::laws_for;
 use super::result::{DroneAnalysis, FlightAnalysis, Laws, Trace, WindowStats};
-use super::running::{RUNNING_S, Running};
+use super::running::{GAP_S, RUNNING_S, Running};
 use super::statistics::tilt_wind::LeanDrag;
 use super::stats::mean_sd;
-use super::steps::steady;
+use super::steps::{steady, steady_across_holes};
 use super::track;
 use super::turbulence::Records;
 use super::updraft::{self, DroneSeries, Lean};
@@ -28,6 +29,9 @@ use crate::base::causes::with_causes;
 use crate::base::plain::{Shown as _, plain};
 use crate::flight::{Alignment, Flight, FlightOptions, Loss, Series, table};
 use crate::mission::plan::{Purpose, Segment, Slot};
+
+/// Stretches without values that are told one by one.
+const MOST_STRETCHES: usize = 4;
 
 /// What all logs of a flight share.
 pub(super) struct Shared<'a> {
@@ -125,8 +129,11 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let mut of_air = match slot {
-        Some((_, segments)) if log.table.is_none() => windows::of_air(segments),
+    let mut of_air = match (slot, &log.table) {
+        (Some((_, segments)), None) => windows::of_air(segments),
+        (_, Some(mapping)) if flight.desired_up_mps.is_none() => {
+            steady_across_holes(flight, &mapping.steps)
+        }
         _ => targets.clone(),
     };
     let truth = true_air(flight, &of_air);
@@ -145,6 +152,11 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         && let Some(measured) = &mut series.measured
     {
         measured.quality.extend(left);
+        warnings.extend(truth.as_ref().and_then(truth_in_part));
+        if input.level.is_some() {
+            warnings.extend(shorter_hovers(&of_air));
+            warnings.extend(silent_stretches(&measured.quality));
+        }
     }
     let source = input.shown(&log.path);
     let drone = DroneAnalysis {
@@ -191,9 +203,60 @@ fn true_air(flight: &Flight, targets: &[Target]) -> Option<TruthSeries> {
     let half = RUNNING_S / 2.0;
     let (first_s, last_s) =
         ((hover.start_s + half).ceil() as i64, (hover.end_s - half).floor() as i64);
-    let means: Option<Vec<f64>> =
-        (first_s..=last_s).map(|time| running.mean(time as f64)).collect();
-    Some(TruthSeries { first_s, updraft_mps: means? })
+    let updraft_mps =
+        (first_s..=last_s).map(|time| running.mean(time as f64).unwrap_or(f64::NAN)).collect();
+    Some(TruthSeries { first_s, updraft_mps })
+}
+
+/// That the true air is not known in all seconds of the hover.
+fn truth_in_part(truth: &TruthSeries) -> Option<Warning> {
+    let [known, of] = truth.known();
+    let compared = match known {
+        0 => "nothing is compared with it".to_owned(),
+        _ => "the others are not compared with it".to_owned(),
+    };
+    (known < of).then(|| {
+        let text = format!(
+            "truth: its means over {RUNNING_S:.0} s are known in {known} of {of} s of the hover, as a silence of more than \
+             {GAP_S:.0} s leaves none: {compared}"
+        );
+        Warning::Log(text.into())
+    })
+}
+
+/// The stretches of a hover that have no value, with the reason of each.
+fn silent_stretches(quality: &[QualityFlag]) -> Option<Warning> {
+    let all: Vec<&str> = quality
+        .iter()
+        .filter(|flag| flag.flag.excludes())
+        .map(|flag| flag.reason.as_str())
+        .collect();
+    let more = match all.len().saturating_sub(MOST_STRETCHES) {
+        0 => String::new(),
+        more => format!("; {more} more stretches are in the report"),
+    };
+    let told: Vec<&str> = all.iter().take(MOST_STRETCHES).copied().collect();
+    let text = format!("hover: {}{more}", told.join("; "));
+    (!all.is_empty()).then(|| Warning::Log(text.into()))
+}
+
+/// That a map is of the longest hover alone, where there are others that could have values.
+fn shorter_hovers(targets: &[Target]) -> Option<Warning> {
+    let longest = updraft::hover(targets)?;
+    let of = |target: &Target| format!("{:.0} to {:.0} s", target.start_s, target.end_s);
+    let others: Vec<String> = targets
+        .iter()
+        .filter(|target| target.kind.is_hover() && *target != longest)
+        .filter(|target| target.end_s - target.start_s >= RUNNING_S)
+        .map(of)
+        .collect();
+    let text = format!(
+        "hover: of several the longest alone is measured, from {}; not used: from {} (a climb or a descent, or another \
+         height behind a hole of the table, ends a hover)",
+        of(longest),
+        others.join(", from ")
+    );
+    (!others.is_empty()).then(|| Warning::Log(text.into()))
 }
 
 /// What one log showed.

@@ -126,20 +126,28 @@ impl FlightInput<'_> {
 pub struct TruthSeries {
     /// Show time of the first value, s; one value follows each second.
     pub first_s: i64,
-    /// Mean updraft over the 10 s around each second, m/s, up positive.
+    /// Mean updraft over the 10 s around each second, m/s, up positive; NaN where it is not known.
     pub updraft_mps: Vec<f64>,
 }
 
 impl TruthSeries {
-    /// The value at a whole second of show time, m/s, up positive; `None`: the series does not reach it.
+    /// The value at a whole second of show time, m/s, up positive; `None`: it is not known then.
     pub fn at_second(&self, time_s: i64) -> Option<f64> {
         let index = usize::try_from(time_s.checked_sub(self.first_s)?).ok()?;
-        self.updraft_mps.get(index).copied()
+        self.updraft_mps.get(index).copied().filter(|value| value.is_finite())
     }
 
-    /// The values at whole seconds of show time; `None` if one is missing.
-    pub(super) fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
-        times_s.iter().map(|time_s| self.at_second(*time_s)).collect()
+    /// The values at whole seconds of show time; `None` if not one is known.
+    pub(super) fn at(&self, times_s: &[i64]) -> Option<Vec<Option<f64>>> {
+        let values: Vec<Option<f64>> =
+            times_s.iter().map(|time_s| self.at_second(*time_s)).collect();
+        values.iter().any(Option::is_some).then_some(values)
+    }
+
+    /// Seconds with a value, and all seconds.
+    pub(super) fn known(&self) -> [usize; 2] {
+        let known = self.updraft_mps.iter().filter(|value| value.is_finite()).count();
+        [known, self.updraft_mps.len()]
     }
 }
 
@@ -152,7 +160,15 @@ mod tests {
         let truth = TruthSeries { first_s: -1, updraft_mps: vec![0.1, 0.2, 0.3] };
         let values = [-2, -1, 0, 1, 2, i64::MIN].map(|time_s| truth.at_second(time_s));
         assert_eq!(values, [None, Some(0.1), Some(0.2), Some(0.3), None, None]);
-        assert_eq!(truth.at(&[0, 1]), Some(vec![0.2, 0.3]));
-        assert_eq!(truth.at(&[1, 2]), None);
+        assert_eq!(truth.at(&[0, 1]), Some(vec![Some(0.2), Some(0.3)]));
+        assert_eq!(truth.at(&[1, 2]), Some(vec![Some(0.3), None]));
+        assert_eq!(truth.at(&[2, 3]), None);
+    }
+
+    #[test]
+    fn a_second_without_truth_costs_no_other_second_its_own() {
+        let truth = TruthSeries { first_s: 5, updraft_mps: vec![0.1, f64::NAN, 0.3] };
+        assert_eq!(truth.at(&[5, 6, 7]), Some(vec![Some(0.1), None, Some(0.3)]));
+        assert_eq!(truth.known(), [2, 3]);
     }
 }

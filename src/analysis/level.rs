@@ -4,6 +4,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::running::RUNNING_S;
+
 /// Shortest stretch that sets a zero, s: three running means of 10 s.
 pub const LEAST_ZERO_S: f64 = 30.0;
 /// Drones whose level is told.
@@ -90,6 +92,12 @@ impl LevelledMap {
             None => "the calibration's windows".to_owned(),
         };
         format!("the response of the {} with its level fitted to {level}", self.response)
+    }
+
+    /// Whether the running mean at a time has nothing of the stretch that sets the zero.
+    pub fn is_outside(&self, time_s: f64) -> bool {
+        let half_s = 0.5 * RUNNING_S;
+        self.zero_s.is_none_or(|[from, to]| time_s - half_s >= to || time_s + half_s <= from)
     }
 
     /// Sentences about the levels of the first drones.

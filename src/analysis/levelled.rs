@@ -137,7 +137,9 @@ pub(super) fn measure(
         .filter_map(|doubt| Moments::of(in_stretch(doubt)).and_then(|moments| moments.variance()));
     let noise_mps = (white_mps * white_mps + doubted.sum::<f64>()).sqrt();
     let gain = if sd_mps > 0.0 { (1.0 - (noise_mps / sd_mps).powi(2)).max(0.0) } else { 0.0 };
-    let zero_length_s = level.zero_s.map(|[from, to]| to - from);
+    let silent = found.values_mps.iter().enumerate();
+    let silent = silent.filter(|(index, value)| stretch(*index) && value.is_none()).count();
+    let zero_length_s = level.zero_s.map(|zero_s| told_s(zero_s, silent));
     let level_se_mps = match (zero_length_s, found.level_se) {
         (Some(length_s), _) => steady.map_or(sd_mps, |steady| steady.error_mps(length_s)),
         (None, Some(level_se)) => {
@@ -235,6 +237,11 @@ fn windows_of<'a>(reference: &'a FlightAnalysis, name: &str) -> Vec<&'a WindowSt
     let all = || reference.drones.iter().collect();
     let drones: Vec<&DroneAnalysis> = if own.is_empty() { all() } else { own };
     drones.iter().flat_map(|drone| &drone.windows).filter(|one| one.rejected.is_empty()).collect()
+}
+
+/// Time of a zero stretch that tells of its zero, s: seconds without a value do not.
+fn told_s([from, to]: [f64; 2], silent: usize) -> f64 {
+    (to - from - silent as f64).max(RUNNING_S)
 }
 
 /// A hover through one response.
@@ -357,12 +364,13 @@ pub(super) fn of_map(
         .filter_map(|(one, truth)| Some((*one, one.levelled.as_deref()?, truth.as_ref())))
         .collect();
     let first = known.first()?.1;
-    Some(LevelledMap {
+    let levelled = LevelledMap {
         response: first.response.clone(),
         zero_s: first.zero_s,
         drones: known.iter().map(|(_, one, _)| one.level.clone()).collect(),
-        held_out: held_out(&known),
-    })
+        held_out: None,
+    };
+    Some(LevelledMap { held_out: held_out(&known, &levelled), ..levelled })
 }
 
 /// One value outside of the zero stretch.
@@ -376,7 +384,10 @@ struct Compared {
     is_apart: bool,
 }
 
-fn held_out(drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)]) -> Option<HeldOut> {
+fn held_out(
+    drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)],
+    map: &LevelledMap,
+) -> Option<HeldOut> {
     let mut all: Vec<Compared> = Vec::new();
     for (series, levelled, truth) in drones {
         let (Some(truth), Some(measured)) = (truth, series.measured.as_ref()) else { continue };
@@ -384,9 +395,7 @@ fn held_out(drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)]) -> Optio
         for (index, estimate) in series.updraft_mps.iter().enumerate() {
             let second = series.first_s + index as i64;
             let time_s = second as f64;
-            let outside = levelled
-                .zero_s
-                .is_none_or(|[from, to]| time_s - HALF_S >= to || time_s + HALF_S <= from);
+            let outside = map.is_outside(time_s);
             let value = (|| {
                 let [low, high] = measured.interval_mps.get(index).copied().flatten()?;
                 let half = 0.5 * (high - low);
@@ -437,4 +446,16 @@ fn held_out(drones: &[(&DroneSeries, &Levelled, Option<&TruthSeries>)]) -> Optio
         half_width_there_mps: middle(|one| one.half_there)?,
         inside_share_there: inside(|one| one.half_there),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_with_a_hole_tells_less_of_its_zero() {
+        assert_eq!(told_s([0.0, 150.0], 0), 150.0);
+        assert_eq!(told_s([0.0, 150.0], 67), 83.0);
+        assert_eq!(told_s([0.0, 30.0], 67), RUNNING_S);
+    }
 }

@@ -4,6 +4,11 @@
 //! wind and the lift that wind gives are those that the simulator flies. Only its level is not taken from it: no file
 //! knows the mass and the rotors of one drone to a percent.
 
+use super::lean_table::LeanTable;
+
+/// Step of the leans in a table of winds, degrees.
+const LEAN_STEP_DEG: f64 = 0.1;
+
 /// Rotor effort of steady flight by wind and climb.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Response {
@@ -52,6 +57,18 @@ impl Response {
             return self.wind_step_mps * above.saturating_sub(1) as f64;
         };
         self.wind_step_mps * ((above - 1) as f64 + (lean_deg - from) / (to - from))
+    }
+
+    /// The winds that leans are held against, as a vehicle's own table has them; `None`: it has no wind.
+    pub fn leans(&self) -> Option<LeanTable> {
+        let steepest = self.lean_deg.last().copied().filter(|deg| *deg > 0.0)?;
+        let steps = 0..=(steepest / LEAN_STEP_DEG) as usize;
+        let wind = |step: usize| self.wind_mps(step as f64 * LEAN_STEP_DEG);
+        Some(LeanTable {
+            lean_step_deg: LEAN_STEP_DEG,
+            wind_mps: steps.map(wind).collect(),
+            ..LeanTable::default()
+        })
     }
 
     /// Effort in a wind at a climb through the air; `None` beyond the table.
@@ -132,6 +149,18 @@ mod tests {
         assert_eq!(table.effort(0.0, 2.5), None);
         assert_eq!(table.effort(0.0, f64::NAN), None);
         assert_eq!(table.slope(0.0, 0.0), Some(15.0));
+    }
+
+    #[test]
+    fn its_leans_are_a_table_of_winds() {
+        let table = table();
+        let leans = table.leans().unwrap();
+        for lean_deg in [0.0, 0.4, 1.0, 3.5, 4.85] {
+            let wind_mps = leans.wind_at(lean_deg).unwrap();
+            assert!((wind_mps - table.wind_mps(lean_deg)).abs() < 1e-9, "{lean_deg}: {wind_mps}");
+        }
+        assert_eq!(leans.wind_at(9.0), None, "no wind is told beyond the table");
+        assert_eq!(Response::line("legs".to_owned(), 80.0, 0.1).leans(), None);
     }
 
     #[test]

@@ -532,12 +532,19 @@ pub struct DroneUpdraft {
     /// What is doubtful, by stretches of time.
     #[serde(default)]
     pub quality: Vec<QualityFlag>,
-    /// True value at the same times, when it is known.
-    pub truth_mps: Option<Vec<f64>>,
+    /// True value at the same times, when it is known; null at times at which it is not.
+    pub truth_mps: Option<Vec<Option<f64>>>,
     /// Where it was on the globe; absent: its log does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place: Option<DronePlace>,
     /// Horizontal wind on it; absent: the drag of the vehicle or the heading is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wind: Option<DroneWindSeries>,
+}
+
+impl DroneUpdraft {
+    /// True value at one of [`UpdraftMap::time_s`], m/s, where it is known.
+    pub fn truth_at(&self, index: usize) -> Option<f64> {
+        self.truth_mps.as_ref()?.get(index).copied().flatten()
+    }
 }

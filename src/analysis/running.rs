@@ -5,7 +5,7 @@ use crate::flight::Series;
 /// Length of the running window, s: the paper's.
 pub(super) const RUNNING_S: f64 = 10.0;
 /// A silence longer than this breaks a running window, s: a tenth of it. Chosen.
-const GAP_S: f64 = 1.0;
+pub(super) const GAP_S: f64 = 1.0;
 
 /// Time-weighted running means by prefix sums, so that the logging rate does not matter.
 pub(super) struct Running<'a> {

@@ -2,6 +2,7 @@
 
 use super::budget::TruthCheck;
 use super::kriging::Best;
+use super::level::LevelledMap;
 use super::posterior::half_mps;
 use super::result::DroneUpdraft;
 use crate::numeric::rms;
@@ -33,13 +34,39 @@ pub(super) fn at_limit(map: &[DroneUpdraft], drones: &[usize], best: &[Best]) ->
     let (mut limit, mut own) = (Vec::new(), Vec::new());
     for one in best {
         let Some(drone) = drones.get(one.drone).and_then(|index| map.get(*index)) else { continue };
-        let truth = drone.truth_mps.as_ref().and_then(|truth| truth.get(one.second));
+        let truth = drone.truth_at(one.second);
         let found = drone.posterior_mps.get(one.second).copied().flatten();
         let Some((truth, found)) = truth.zip(found) else { continue };
         limit.push(one.updraft_mps - truth);
         own.push(found - truth);
     }
     Some([rms(limit)?, rms(own)?])
+}
+
+/// Share of a drone's values that have a truth, below which its mean is not compared with one of other seconds.
+const COVERED: f64 = 0.8;
+
+/// Compares the estimates of a map with a fitted level with the truth, where the truth did not set the level: the mean over
+/// the zero stretch is zero by what was asked for. Means over the hover have that stretch in them, and are not compared.
+pub(super) fn check_levelled(
+    drones: &[DroneUpdraft],
+    levelled: &LevelledMap,
+    times_s: &[i64],
+) -> Option<TruthCheck> {
+    if levelled.zero_s.is_none() {
+        return check(drones);
+    }
+    let outside = |drone: &DroneUpdraft| {
+        let values = drone.updraft_mps.iter().zip(times_s);
+        DroneUpdraft {
+            updraft_mps: values
+                .map(|(value, time_s)| value.filter(|_| levelled.is_outside(*time_s as f64)))
+                .collect(),
+            mean_interval_mps: None,
+            ..drone.clone()
+        }
+    };
+    check(&drones.iter().map(outside).collect::<Vec<_>>())
 }
 
 /// Compares estimates with the truth; `None` where the truth is not known.
@@ -52,7 +79,7 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
         let Some(truth) = &drone.truth_mps else { continue };
         let (mut true_sum, mut values) = (0.0, 0_usize);
         for (index, (estimate, truth)) in drone.updraft_mps.iter().zip(truth).enumerate() {
-            let Some(estimate) = estimate else { continue };
+            let (Some(estimate), Some(truth)) = (estimate, truth) else { continue };
             let error = estimate - truth;
             sum += error;
             squares += error * error;
@@ -69,7 +96,9 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
         }
         check.drones += 1;
         check.values += values;
-        if let Some([low, high]) = drone.mean_interval_mps {
+        let estimates = drone.updraft_mps.iter().flatten().count();
+        let is_covered = values as f64 >= COVERED * estimates as f64;
+        if let Some([low, high]) = drone.mean_interval_mps.filter(|_| is_covered) {
             means += 1;
             means_inside += usize::from((low..=high).contains(&(true_sum / values as f64)));
         }
@@ -95,6 +124,9 @@ mod tests {
 
     fn drone(updraft_mps: Vec<Option<f64>>, truth_mps: Option<Vec<f64>>) -> DroneUpdraft {
         let interval = |value: &Option<f64>| value.map(|value| [value - 0.15, value + 0.15]);
+        let truth_mps = truth_mps.map(|truth| {
+            truth.into_iter().map(|value| value.is_finite().then_some(value)).collect()
+        });
         DroneUpdraft {
             slot: Some(1),
             name: String::new(),
@@ -136,5 +168,27 @@ mod tests {
         assert!((found.inside_share.unwrap() - 2.0 / 3.0).abs() < 1e-12);
         assert_eq!(found.means_inside_share, Some(1.0), "0.2 is in 0.0 to 0.3");
         assert_eq!(check(&[drone(vec![Some(1.0)], None)]), None);
+    }
+
+    #[test]
+    fn seconds_without_truth_are_not_compared_and_the_others_are() {
+        let truth = vec![0.1, f64::NAN, f64::NAN, 0.3];
+        let found = check(&[drone(vec![Some(0.2); 4], Some(truth))]).unwrap();
+        assert_eq!((found.drones, found.values), (1, 2));
+        assert!((found.rms_mps - 0.1).abs() < 1e-12, "{found:?}");
+        assert_eq!(found.means_inside_share, None, "the mean is one of other seconds");
+    }
+
+    #[test]
+    fn what_set_the_zero_is_not_held_against_it() {
+        let levelled = LevelledMap { zero_s: Some([0.0, 20.0]), ..LevelledMap::default() };
+        let times_s: Vec<i64> = vec![10, 24, 25, 26];
+        let own = [drone(vec![Some(0.2); 4], Some(vec![9.0, 9.0, 0.3, 0.4]))];
+        let found = check_levelled(&own, &levelled, &times_s).unwrap();
+        assert_eq!((found.values, found.inside_share), (2, Some(0.5)));
+        assert!((found.bias_mps + 0.15).abs() < 1e-12, "{found:?}");
+        assert_eq!(found.means_inside_share, None);
+        let whole = check_levelled(&own, &LevelledMap::default(), &times_s).unwrap();
+        assert_eq!(whole.values, 4);
     }
 }

@@ -313,6 +313,12 @@ impl AnalyzeArgs {
                  its two laws alone: leave out one of them"
             )));
         }
+        if self.options.law != LawChoice::Auto {
+            return Err(WorkflowError::Usage(format!(
+                "{asked} inverts a table with a response whose level is fitted, and with none of the laws that --law chooses \
+                 from: leave out one of them"
+            )));
+        }
         let zero_s = self.zero.map(|ZeroStretch(zero_s)| zero_s);
         Ok(Some(LevelWish { vehicle: self.vehicle.clone(), zero_s }))
     }

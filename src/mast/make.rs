@@ -6,7 +6,7 @@ use std::path::Path;
 
 use turbulence_statistics::spectrum::{Band, Instrument, cross, mean, spectrum};
 use turbulence_statistics::transfer::Transfer;
-use turbulence_statistics::{Record, moments};
+use turbulence_statistics::{Moment, Record, moments};
 
 use super::matched::{averages, best_shift, matched};
 use super::record::MastRecord;
@@ -34,6 +34,8 @@ const SHIFTS_S: f64 = 60.0;
 const HIGHEST_HZ: f64 = 0.044;
 /// Fewer common seconds are no comparison.
 const FEWEST_SECONDS: usize = 30;
+/// Standard deviations to each side of a normal 95 % interval.
+const NORMAL: f64 = 1.96;
 
 /// Ten-second means of one drone, second by second.
 pub(super) struct Drone {
@@ -47,7 +49,10 @@ pub(super) struct Drone {
 /// A drone's value in one second.
 #[derive(Clone, Copy)]
 pub(super) struct Value {
+    /// Value that is compared: of the posterior where the flight has one, else the drone's own.
     pub(super) w: f64,
+    /// The drone's own value, of which variances and spectra are: the posterior is smoother than the air.
+    pub(super) own: f64,
     pub(super) se: f64,
     pub(super) noise: f64,
     pub(super) interval: [f64; 2],
@@ -102,15 +107,29 @@ pub fn compare(
     })
 }
 
+/// A row's own value with its 95 % interval, and its time, UTC, ms since 1970, if it has all of them.
+fn own(row: &FieldRow) -> Option<(i64, f64, [f64; 2])> {
+    Some((row.utc_ms?, row.w_mps?, [row.low_mps?, row.high_mps?]))
+}
+
+/// Mean and standard deviation of the posterior in a row, m/s.
+fn posterior(row: &FieldRow) -> Option<[f64; 2]> {
+    Some([row.posterior_mps?, row.posterior_sd_mps?])
+}
+
+/// Whether all values of a flight have a posterior: the estimate that its map stands for, with the errors of all drones
+/// together.
+fn has_posterior(rows: &[FieldRow]) -> bool {
+    let mut known = rows.iter().filter(|row| own(row).is_some()).peekable();
+    known.peek().is_some() && known.all(|row| posterior(row).is_some())
+}
+
 /// The drones of a flight with UTC, by their rows.
 fn drones(rows: &[FieldRow]) -> Vec<Drone> {
+    let has_posterior = has_posterior(rows);
     let mut drones: Vec<Drone> = Vec::new();
     for row in rows {
-        let (Some(at), Some(w), Some(low), Some(high)) =
-            (row.utc_ms, row.w_mps, row.low_mps, row.high_mps)
-        else {
-            continue;
-        };
+        let Some((at, own, interval)) = own(row) else { continue };
         if drones.last().is_none_or(|drone| drone.label != row.drone) {
             drones.push(Drone {
                 label: row.drone.clone(),
@@ -123,11 +142,16 @@ fn drones(rows: &[FieldRow]) -> Vec<Drone> {
         }
         let Some(drone) = drones.last_mut() else { continue };
         let value = Value {
-            w,
+            w: own,
+            own,
             se: row.w_se_mps.unwrap_or(f64::NAN),
             noise: row.sd_mps.unwrap_or(0.0),
-            interval: [low, high],
+            interval,
             wind: row.wind_mps,
+        };
+        let value = match posterior(row).filter(|_| has_posterior) {
+            Some([w, se]) => Value { w, se, interval: [w - NORMAL * se, w + NORMAL * se], ..value },
+            None => value,
         };
         drone.values.insert((at as f64 / 1000.0).round() as i64, value);
     }
@@ -161,8 +185,10 @@ fn flight(
             |drone: &Drone| drone.place_deg.map_or(f64::INFINITY, |deg| distance_m(place, deg));
         drones.sort_by(|a, b| away(a).total_cmp(&away(b)));
     }
+    let is_posterior = has_posterior(rows);
     if let Some(length_s) = mast.slow_s {
         return slow::flight(name, &drones, &seconds, (mast, length_s), fast)
+            .map(|flight| MastFlight { is_posterior, ..flight })
             .map_err(|reason| format!("{reason}{}", spans(mast, [from, to])));
     }
     let of_mast: Vec<f64> = seconds
@@ -183,8 +209,11 @@ fn flight(
     let nearest = columns.first().cloned().unwrap_or_default();
     let all = matched(&fleet, &of_mast, STEP_S, stated)
         .ok_or("the fleet's mean and the mast have no seconds in common")?;
-    let records: Vec<Record> = columns.iter().map(|values| record(values, &of_mast)).collect();
+    let own = |drone: &Drone| record(&column(drone, &seconds, |value| value.own), &of_mast);
+    let records: Vec<Record> = drones.iter().map(own).collect();
     let noise: Vec<f64> = drones.iter().map(noise2).collect();
+    let variance =
+        |of: Option<Moment>| of.map(|of| if has_hole(&of_mast) { about_own_mean(of) } else { of });
     let told = drones
         .iter()
         .zip(&columns)
@@ -201,7 +230,7 @@ fn flight(
                 above_m: drone.height_m.zip(mast.height_m).map(|(drone, mast)| drone - mast),
                 matched: matched(values, &of_mast, STEP_S, stated)?,
                 inside_share: inside(drone, &seconds, &of_mast),
-                variance: moments::variance(record, *noise, 0.0),
+                variance: variance(moments::variance(record, *noise, 0.0)),
             })
         })
         .collect();
@@ -212,7 +241,7 @@ fn flight(
         highest_hz: HIGHEST_HZ,
         ..Instrument::default()
     };
-    let own: Vec<f64> = mast
+    let all_of_mast: Vec<f64> = mast
         .w
         .between(
             (from as f64) - mast.zero_ms as f64 / 1000.0,
@@ -223,12 +252,13 @@ fn flight(
         flight: name.to_owned(),
         span_ms: [from * 1000, to * 1000],
         mean_s: MEAN_S,
+        is_posterior,
         periods: Vec::new(),
         period_variance: None,
         averages: longer(&fleet, &nearest, &of_mast, stated),
-        mast_variance: moments::variance(&of_mast_record, 0.0, 0.0),
-        mast_variance_all: Some(variance_of(&own)),
-        drone_variance: moments::mean_variance(&refs, &noise, 0.0),
+        mast_variance: variance(moments::variance(&of_mast_record, 0.0, 0.0)),
+        mast_variance_all: Some(variance_of(&all_of_mast)),
+        drone_variance: variance(moments::mean_variance(&refs, &noise, 0.0)),
         mast_spectrum: spectrum(&of_mast_record, &instrument),
         drone_spectrum: mean(&refs, &instrument),
         coherence: records
@@ -335,6 +365,25 @@ fn record(values: &[f64], other: &[f64]) -> Record {
     Record::new(STEP_S, both)
 }
 
+/// Whether values are missing between the first and the last.
+fn has_hole(values: &[f64]) -> bool {
+    let is_known = |value: &f64| value.is_finite();
+    let first = values.iter().position(is_known).unwrap_or(0);
+    let last = values.iter().rposition(is_known).unwrap_or(0);
+    values.get(first..last).unwrap_or_default().iter().any(|value| !is_known(value))
+}
+
+/// A variance about the record's own mean, without what this mean takes: that follows from the integral time of a record
+/// in one piece. Over a hole it would be made of air that nobody saw, and could be more than all that was measured.
+fn about_own_mean(of: Moment) -> Moment {
+    if !(of.value > 0.0 && of.systematic > 0.0) {
+        return of;
+    }
+    let share = (1.0 - of.systematic / of.value).max(0.0);
+    let random2 = (of.random.powi(2) - 2.0 * of.systematic.powi(2)).max(0.0);
+    Moment::of_variance(of.value * share, random2.sqrt() * share, 0.0, (0.0, of.time_s))
+}
+
 fn inside(drone: &Drone, seconds: &[i64], mast: &[f64]) -> f64 {
     let both = seconds.iter().zip(mast).filter(|(_, mast)| mast.is_finite());
     let all: Vec<bool> = both
@@ -410,5 +459,64 @@ mod tests {
         assert!((found - 0.5 * 0.95).abs() < 2e-3, "{found}");
         assert!(missed(&fine[..80]).unwrap() < 0.2 * 0.5 * 0.04, "slow air is in the means");
         assert!(missed(&fine[..1]).is_none());
+    }
+
+    #[test]
+    fn nothing_is_added_to_a_variance_over_a_hole() {
+        let hole = [f64::NAN, 0.1, f64::NAN, 0.2, f64::NAN];
+        assert!(has_hole(&hole));
+        assert!(!has_hole(&hole[..2]) && !has_hole(&[0.1, 0.2]) && !has_hole(&[]));
+        let of = Moment {
+            value: 0.150,
+            low: 0.034,
+            high: 28.7,
+            random: 0.2,
+            systematic: 0.092,
+            time_s: 25.0,
+        };
+        let found = about_own_mean(of);
+        assert!((found.value - 0.058).abs() < 1e-12 && found.systematic == 0.0, "{found:?}");
+        assert!(found.random < of.random && found.low < found.value && found.value < found.high);
+        let whole = Moment { systematic: 0.0, ..of };
+        assert_eq!(about_own_mean(whole), whole);
+    }
+
+    fn row(second: i64, posterior: Option<[f64; 2]>) -> FieldRow {
+        FieldRow {
+            flight: "hover".to_owned(),
+            time_s: second as f64,
+            slot: Some(1),
+            drone: "Drone 1".to_owned(),
+            x_m: None,
+            y_m: None,
+            z_m: None,
+            w_mps: Some(0.4),
+            sd_mps: Some(0.05),
+            low_mps: Some(-0.7),
+            high_mps: Some(1.5),
+            flags: String::new(),
+            truth_mps: None,
+            posterior_mps: posterior.map(|[w, _]| w),
+            posterior_sd_mps: posterior.map(|[_, sd]| sd),
+            utc_ms: Some(second * 1000),
+            fix: crate::products::Fix::default(),
+            w_se_mps: Some(0.56),
+            wind_mps: None,
+            wind_se_mps: None,
+        }
+    }
+
+    #[test]
+    fn the_posterior_is_what_is_compared_where_there_is_one() {
+        let rows = [row(0, Some([0.1, 0.2])), row(1, Some([0.1, 0.2]))];
+        assert!(has_posterior(&rows));
+        let value = drones(&rows)[0].values[&1];
+        assert_eq!((value.w, value.own, value.se), (0.1, 0.4, 0.2));
+        assert!((value.interval[0] - (0.1 - 0.392)).abs() < 1e-12, "{:?}", value.interval);
+        // Of two estimates that are mixed nobody would know which was judged.
+        let mixed = [row(0, Some([0.1, 0.2])), row(1, None)];
+        assert!(!has_posterior(&mixed) && !has_posterior(&[]));
+        let value = drones(&mixed)[0].values[&0];
+        assert_eq!((value.w, value.own, value.se), (0.4, 0.4, 0.56));
     }
 }

@@ -42,6 +42,10 @@ pub struct MastFlight {
     pub span_ms: [i64; 2],
     /// Time over which both are averaged, s: 10, or the means of a slow mast.
     pub mean_s: f64,
+    /// Whether the drones' values are those of the posterior, all drones together; variances, spectra and coherence are of
+    /// each drone's own values in any case. Absent: all are each drone's own.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_posterior: bool,
     /// Mean of all drones against the mast.
     pub fleet: Matched,
     /// Each drone against the mast, the nearest first.

@@ -141,11 +141,14 @@ pub(super) fn flight(
             })
         })
         .collect();
-    let of_periods = beside(&periods, mast, (&columns, &noise), &of_fleet, fast);
+    let own: Vec<Vec<f64>> =
+        drones.iter().map(|drone| column(drone, seconds, |value| value.own)).collect();
+    let of_periods = beside(&periods, mast, (&own, &noise), [&of_fleet, &nearest], fast);
     Ok(MastFlight {
         flight: name.to_owned(),
         span_ms: [from * 1000, to * 1000],
         mean_s: length_s,
+        is_posterior: false,
         averages: longer(&periods, [&of_fleet, &nearest], &mast_row, stated),
         fleet: whole,
         drones: of_drones,
@@ -174,11 +177,11 @@ fn beside(
     periods: &Periods,
     mast: &MastRecord,
     (columns, noise): (&[Vec<f64>], &[f64]),
-    of_fleet: &[f64],
+    [of_fleet, nearest]: [&[f64]; 2],
     fast: Option<f64>,
 ) -> Vec<MastPeriod> {
     let means = periods.means(of_fleet, 0);
-    let nearest = columns.first().map(|values| periods.means(values, 0)).unwrap_or_default();
+    let nearest = periods.means(nearest, 0);
     let known =
         |values: &[f64], index: usize| values.get(index).copied().filter(|value| value.is_finite());
     let row = |(index, period): (usize, &Period)| {

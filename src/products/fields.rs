@@ -272,7 +272,7 @@ fn row(
         low_mps: finite(interval.map(|interval| interval[0])),
         high_mps: finite(interval.map(|interval| interval[1])),
         flags: flags(&drone.quality, time_s),
-        truth_mps: finite(drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied())),
+        truth_mps: finite(drone.truth_at(index)),
         posterior_mps: finite(drone.posterior_mps.get(index).copied().flatten()),
         posterior_sd_mps: finite(drone.posterior_sd_mps.get(index).copied().flatten()),
         utc_ms: None,

@@ -8,12 +8,16 @@ use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap
 use crate::numeric::Sorted;
 
 use super::doubts::doubts;
+use super::figures::air::where_compared;
 use super::fleet_air::fleet_air;
 use super::text::{NONE, count, fixed, signed, usable};
 
 /// A kind of error: its name, what it is, and where it stands in the drone's and the common budget.
 type BudgetRow =
     (&'static str, &'static str, fn(&ErrorBudget) -> f64, Option<fn(&CommonError) -> f64>);
+
+/// The zero of a map by a calibration.
+const ZERO: &str = "slow air during the calibration that the whole fleet shared";
 
 const KINDS: [BudgetRow; 7] = [
     ("hover", "noise of pulse and velocity in the hover", |e| e.window_mps, None),
@@ -23,12 +27,7 @@ const KINDS: [BudgetRow; 7] = [
         |e| e.law_mps,
         Some(|c| c.law_mps),
     ),
-    (
-        "zero",
-        "slow air during the calibration that the whole fleet shared",
-        |e| e.zero_mps,
-        Some(|c| c.zero_mps),
-    ),
+    ("zero", ZERO, |e| e.zero_mps, Some(|c| c.zero_mps)),
     (
         "battery",
         "change of battery voltage beyond its correction, and other drift",
@@ -49,26 +48,28 @@ const KINDS: [BudgetRow; 7] = [
 pub(super) fn section(map: &UpdraftMap) -> Value {
     let truth = map.truth.filter(|truth| truth.values > 0 && usable(truth.rms_mps)).map(|truth| {
         let percent = |share: f64| fixed(100.0 * share, 1);
-        let shares = truth.inside_share.zip(truth.means_inside_share);
-        let inside = shares.map_or_else(String::new, |(values, means)| {
+        let inside = truth.inside_share.map_or_else(String::new, |values| {
+            let means = truth.means_inside_share.map_or_else(String::new, |means| {
+                format!(", and so do the true means of {} % of the drones", percent(means))
+            });
             format!(
-                "; {} % of the true values lie inside their 95 % intervals, and so do the true means of {} % of \
-                 the drones",
-                percent(values),
-                percent(means)
+                "; {} % of the true values lie inside their 95 % intervals{means}",
+                percent(values)
             )
         });
         let of_means = fleet_air(map).and_then(|air| air.rms_error);
         format!(
-            "Estimate and truth: over {} (running means of 10 s) of {}, W* − W has a root mean square \
+            "Estimate and truth: over {} (running means of 10 s) of {}{}, W* − W has a root mean square \
              of {} m/s and a mean of {} m/s ({} m/s without that mean){}{inside}.",
             count(truth.values, "value"),
             count(truth.drones, "drone"),
+            where_compared(map),
             fixed(truth.rms_mps, 3),
             signed(truth.bias_mps, 3),
             fixed(truth.rms_without_bias_mps, 3),
             of_means.map_or_else(String::new, |rms| format!(
-                "; that of means over the hover has {} m/s",
+                "; that of means over {} has {} m/s",
+                if where_compared(map).is_empty() { "the hover" } else { "them" },
                 fixed(rms, 3)
             )),
         )
@@ -96,7 +97,8 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
         .map(|(name, what, of, common)| {
             let common = common.zip(map.common.as_ref()).map(|(of, common)| of(common));
             let (median, largest, common) = row(of, common);
-            context! { name => *name, what => *what, median, largest, common, total => false }
+            let what = if *name == "zero" { zero_words(map) } else { what };
+            context! { name => *name, what, median, largest, common, total => false }
         })
         .collect();
     let (median, largest, common) = row(&|e| e.total_mps, map.common.map(|common| common.se_mps));
@@ -109,6 +111,19 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
         fleet => drones.len() > 1,
         half_width => half_width.map(|common| fixed(common.half_width_mps, 2)),
     })
+}
+
+/// What the zero of a map rests on.
+fn zero_words(map: &UpdraftMap) -> &'static str {
+    match &map.levelled {
+        Some(levelled) if levelled.zero_s.is_some() => {
+            "the true mean of the air over the stretch that was set to zero"
+        }
+        Some(_) => {
+            "the level: air during the calibration's windows, and the air's density on another day"
+        }
+        None => ZERO,
+    }
 }
 
 /// `49 drones have a value in 99.8 % of 590 s`.

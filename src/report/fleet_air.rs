@@ -3,7 +3,7 @@
 use crate::analysis::result::{DroneUpdraft, UpdraftMap};
 use crate::numeric::{least, most};
 
-use super::figures::air::{deviation, mean, mean_truth};
+use super::figures::air::{deviation, mean, mean_error};
 use super::text::{count, fixed, usable};
 
 /// Standard errors to each side of a normal 95 % interval.
@@ -63,7 +63,13 @@ impl MeanError {
                     half_width: (usable(half_width) && half_width > 0.0).then_some(half_width),
                 }
             }
-            None => Self { se: one.hypot(systematic), half_width: None },
+            None => {
+                let halves: Option<Vec<f64>> = known()
+                    .map(|drone| drone.mean_interval_mps.map(|[low, high]| (high - low) / 2.0))
+                    .collect();
+                let half_width = halves.and_then(|halves| mean(halves.into_iter()));
+                Self { se: one.hypot(systematic), half_width }
+            }
         }
     }
 
@@ -88,7 +94,7 @@ impl FleetAir {
 pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
     let means = map.drones.iter().map(|drone| drone.mean.value).filter(|&w| usable(w));
     let squares = map.drones.iter().filter_map(|drone| {
-        let error = drone.mean.value - mean_truth(drone)?;
+        let error = mean_error(map, drone)?;
         usable(error).then_some(error * error)
     });
     Some(FleetAir {
@@ -154,7 +160,27 @@ mod tests {
         assert_eq!(air.error.words(2), "± 0.32 m/s standard error (95 %: ± 0.63)");
         assert_eq!(air.spread_words().unwrap(), "0.74 m/s between 25 drones");
         // Nothing known of what is shared: averaging is not taken to help.
-        assert_eq!(fleet_air(&map(25, None)).unwrap().error.se, 0.5);
+        let error = fleet_air(&map(25, None)).unwrap().error;
+        assert_eq!(error, MeanError { se: 0.5, half_width: Some(1.1) });
+        let mut one_without = map(25, None);
+        one_without.drones[3].mean_interval_mps = None;
+        assert_eq!(fleet_air(&one_without).unwrap().error.half_width, None);
+    }
+
+    #[test]
+    fn the_stretch_that_sets_the_zero_is_not_in_the_error_of_a_mean() {
+        let mut map = map(1, None);
+        map.time_s = vec![10.0, 25.0, 26.0, 27.0];
+        let drone = &mut map.drones[0];
+        drone.updraft_mps = vec![Some(0.0), Some(0.4), Some(0.4), Some(0.4)];
+        drone.truth_mps = Some(vec![Some(9.0), Some(0.1), Some(0.3), None]);
+        let rms = |map: &UpdraftMap| fleet_air(map).unwrap().rms_error.unwrap();
+        assert!((rms(&map) - 8.6 / 3.0).abs() < 1e-12, "{}", rms(&map));
+        map.levelled = Some(crate::analysis::result::LevelledMap {
+            zero_s: Some([0.0, 20.0]),
+            ..Default::default()
+        });
+        assert!((rms(&map) - 0.2).abs() < 1e-12, "{}", rms(&map));
     }
 
     #[test]

@@ -119,7 +119,7 @@ fn estimate(map: &UpdraftMap, drone: usize, time: usize) -> Option<f64> {
 }
 
 fn true_air(map: &UpdraftMap, drone: usize, time: usize) -> Option<f64> {
-    map.drones.get(drone)?.truth_mps.as_ref()?.get(time).copied().filter(|w| usable(*w))
+    map.drones.get(drone)?.truth_at(time).filter(|w| usable(*w))
 }
 
 /// A round number around nearly all of these sizes.

@@ -107,7 +107,7 @@ fn air_tiles(flight: &FlightAnalysis) -> Vec<(String, String, String)> {
         } else {
             format!("of the means of {} places", air.n)
         };
-        let label = format!("rms error {of}");
+        let label = format!("rms error {of}{}", air::where_compared(map));
         let against = if flight.simulated { "simulated air" } else { "instrument's values" };
         tiles.push(match together.and_then(|_| together_error(map)) {
             Some(error) => (

@@ -82,6 +82,13 @@ pub(super) fn sentences(flight: &MastFlight) -> Vec<String> {
         "In the mean the drones say {} m/s more than the mast{sampled}{stated}.",
         bias(fleet)
     )];
+    if flight.is_posterior {
+        all.push(
+            "The drones' values are those of the posterior, all drones together; variances, spectra and coherence are of each \
+             drone's own values."
+                .to_owned(),
+        );
+    }
     let follows = match (fleet.correlation, fleet.slope) {
         (Some(r), Some(slope)) => {
             format!(", correlation {}, slope {} (drones on mast)", signed(r, 2), fixed(slope, 2))

@@ -12,7 +12,7 @@ use super::compare::{
     better_words, clock, compared, comparison, drone_laws, drones_of, flock_lines, no_measurement,
     not_compared_lines, nothing, scatter_line, table_heading, windows_used,
 };
-use super::figures::air::mean_truth;
+use super::figures::air::{mean_error, where_compared};
 use super::fleet_air::fleet_air;
 use super::headline::{bent_cells, bent_line, held, held_cell, held_words};
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
@@ -373,11 +373,13 @@ impl Output {
                 ),
             );
         } else if let Some(rms) = air.rms_error {
-            let known = map.drones.iter().filter(|drone| mean_truth(drone).is_some()).count();
-            self.line(
+            let known = map.drones.iter().filter(|drone| mean_error(map, drone).is_some()).count();
+            self.wrapped(
                 "",
+                "  ",
                 &format!(
-                    "  rms error of means against the truth: {} m/s ({})",
+                    "rms error of means against the truth{}: {} m/s ({})",
+                    where_compared(map),
                     fixed(rms, 3),
                     count(known, "drone")
                 ),

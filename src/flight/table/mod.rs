@@ -1,6 +1,7 @@
 //! Flights from other people's tables (CSV). A mapping file says which column holds which quantity
 //! in which unit; this is the border where their signs and units become ours.
 
+mod cells;
 mod mapping;
 mod read;
 mod time;

@@ -6,6 +6,7 @@ use std::io::{self, BufRead as _, BufReader, Read};
 use std::path::Path;
 
 use super::TableError;
+use super::cells::Cells;
 use super::mapping::{Channel, Mapping, TimeColumn, TimeFormat};
 use super::time::date_time;
 use crate::base::file::{FileError, open_named};
@@ -34,32 +35,68 @@ struct Wanted<'a> {
     series: Series,
     /// Rows that are no measurement.
     left_out: usize,
+    /// Cells that are looked at for what cannot be.
+    cells: Option<Cells>,
 }
 
 impl Wanted<'_> {
     /// Takes a row. Empty cells and what is not finite are no measurement.
-    fn take(&mut self, time_s: f64, row: &csv::StringRecord) -> Result<(), (String, String)> {
+    fn take(
+        &mut self,
+        (time_s, line): (f64, u64),
+        row: &csv::StringRecord,
+    ) -> Result<(), (String, String)> {
         let mut sum = 0.0;
+        let kept = self.series.len();
         for (index, name) in &self.columns {
             let cell = row.get(*index).unwrap_or_default().trim();
             if cell.is_empty() {
-                self.left_out += 1;
+                self.leave_out(kept);
                 return Ok(());
             }
             let value: f64 = cell.parse().map_err(|_| {
                 ((*name).to_owned(), format!("\"{}\" is not a number", short(cell)))
             })?;
             sum += value;
+            if let Some(cells) = &mut self.cells {
+                cells.values.push(value * self.channel.scale + self.channel.offset);
+            }
         }
         let value =
             sum / self.columns.len().max(1) as f64 * self.channel.scale + self.channel.offset;
         if value.is_finite() {
             self.series.time_s.push(time_s);
             self.series.value.push(value);
+            if let Some(cells) = &mut self.cells {
+                cells.lines.push(line);
+            }
         } else {
-            self.left_out += 1;
+            self.leave_out(kept);
         }
         Ok(())
+    }
+
+    /// Leaves a row out, behind so many that are kept.
+    fn leave_out(&mut self, kept: usize) {
+        self.left_out += 1;
+        if let Some(cells) = &mut self.cells {
+            cells.values.truncate(kept * self.columns.len());
+        }
+    }
+
+    /// Takes out the rows with a cell that cannot be; a sentence for each column and reason.
+    fn take_out(&mut self, name: &str) -> Vec<String> {
+        let Some(cells) = self.cells.take() else { return Vec::new() };
+        let names: Vec<&str> = self.columns.iter().map(|(_, name)| *name).collect();
+        let (bad, told) = cells.impossible(name, &names);
+        if told.is_empty() {
+            return told;
+        }
+        let keep = |values: &[f64]| -> Vec<f64> {
+            values.iter().zip(&bad).filter(|(_, bad)| !**bad).map(|(value, _)| *value).collect()
+        };
+        self.series = Series { time_s: keep(&self.series.time_s), value: keep(&self.series.value) };
+        told
     }
 }
 
@@ -185,12 +222,14 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
     let broken =
         |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
     let heads = reader.headers().map_err(broken)?.clone();
+    // Where lines end with CR and LF, the reader counts a line only when it goes on behind the CR.
+    let lines_before = before + u64::from(reader.position().line() < 2);
     let table = Places::of(&heads, path, wish)?;
     let mut rows = Rows {
         path,
         time: wish.time,
         table,
-        lines_before: before,
+        lines_before,
         first: None,
         start: None,
         last_s: f64::NEG_INFINITY,
@@ -201,7 +240,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
     let mut cut_off: Option<TableError> = None;
     while rows.taken < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
         since_row.set(0);
-        let line = row.position().map_or(0, csv::Position::line) + before;
+        let line = row.position().map_or(0, csv::Position::line) + lines_before;
         if line < wish.first_line {
             continue;
         }
@@ -259,7 +298,8 @@ impl<'a> Places<'a> {
                 .map(|column| Ok((find(column, name)?, column.as_str())))
                 .collect();
             let (columns, series) = (columns?, Series::default());
-            channels.push((name, Wanted { channel, columns, series, left_out: 0 }));
+            let cells = Cells::of(name);
+            channels.push((name, Wanted { channel, columns, series, left_out: 0, cells }));
         }
         Ok(Self { time, time_of_day, channels })
     }
@@ -309,14 +349,15 @@ impl Rows<'_> {
         }
         self.last_s = show_s;
         self.taken += 1;
+        let line = row.position().map_or(0, csv::Position::line) + self.lines_before;
         for (_, one) in &mut self.table.channels {
-            one.take(show_s, row).map_err(|(column, reason)| cell(&column, reason))?;
+            one.take((show_s, line), row).map_err(|(column, reason)| cell(&column, reason))?;
         }
         Ok(())
     }
 
     /// What must be known of how the table was read.
-    fn warnings(&self, cut_off: bool) -> Vec<String> {
+    fn warnings(&mut self, cut_off: bool) -> Vec<String> {
         let mut warnings = Vec::new();
         if cut_off {
             warnings.push("the table's last line is cut off and was left out".to_owned());
@@ -328,11 +369,15 @@ impl Rows<'_> {
             let backward = self.backward;
             warnings.push(format!("{backward} rows whose time does not go forward were left out"));
         }
-        warnings.extend(self.table.channels.iter().filter_map(|(name, one)| holes(name, one)));
+        let last_s = self.last_s;
+        let channels = || self.table.channels.iter();
+        warnings.extend(channels().filter_map(|(name, one)| holes(name, one, last_s)));
+        let channels = self.table.channels.iter_mut();
+        warnings.extend(channels.flat_map(|(name, one)| one.take_out(name)));
         warnings
     }
 
-    fn columns(self, cut_off: bool) -> Columns {
+    fn columns(mut self, cut_off: bool) -> Columns {
         let warnings = self.warnings(cut_off);
         let channels = self.table.channels.into_iter().map(|(name, one)| (name, one.series));
         Columns { start: self.start, channels: channels.collect(), warnings }
@@ -363,17 +408,16 @@ fn flight(columns: Columns, path: &Path, mapping: &Mapping) -> Flight {
     flight
 }
 
-/// That cells of a channel are no measurement: how many, and the longest time without one.
-fn holes(name: &str, one: &Wanted<'_>) -> Option<String> {
-    let (from, to) = one.series.span().unwrap_or_default();
-    let gap_s = one.series.longest_gap_s(from, to);
+/// That cells of a channel are no measurement: how many, and the longest time without one in a table from 0 to `last_s`.
+fn holes(name: &str, one: &Wanted<'_>, last_s: f64) -> Option<String> {
+    let gap_s = one.series.longest_gap_s(0.0, last_s.max(0.0));
     (one.left_out > 0).then(|| {
         let columns: Vec<&str> = one.columns.iter().map(|(_, name)| *name).collect();
         format!(
             "{name}: {} rows without a number in \"{}\" were left out (longest stretch {gap_s:.1} s): \
              they have no value",
             one.left_out,
-            columns.join("\", \"")
+            columns.join("\" or \"")
         )
     })
 }

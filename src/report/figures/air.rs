@@ -24,11 +24,36 @@ struct Instant {
     posterior: Option<f64>,
 }
 
-/// Mean truth of a drone over the times that it was estimated at.
+/// Share of the times with an estimate at which the truth must be known for a mean over them.
+const COVERED: f64 = 0.8;
+
+/// Mean truth of a drone over the times that it was estimated at; `None` where it is not known at most of them.
 pub(in crate::report) fn mean_truth(drone: &DroneUpdraft) -> Option<f64> {
     let truth = drone.truth_mps.as_ref()?;
-    let pairs = drone.updraft_mps.iter().zip(truth);
-    mean(pairs.filter(|(estimate, _)| estimate.is_some()).map(|(_, &truth)| truth))
+    let pairs = || drone.updraft_mps.iter().zip(truth).filter(|(estimate, _)| estimate.is_some());
+    let known = pairs().filter(|(_, truth)| truth.is_some()).count();
+    let is_covered = known as f64 >= COVERED * pairs().count() as f64;
+    mean(pairs().filter_map(|(_, truth)| *truth)).filter(|_| is_covered)
+}
+
+/// Error of a drone's mean against the truth, m/s: of the mean over the hover, or over the seconds that can be compared
+/// where these are not all of it.
+pub(in crate::report) fn mean_error(map: &UpdraftMap, drone: &DroneUpdraft) -> Option<f64> {
+    let levelled = map.levelled.as_ref().filter(|levelled| levelled.zero_s.is_some());
+    let truth = drone.truth_mps.as_ref()?;
+    if levelled.is_none() && truth.iter().all(Option::is_some) {
+        return Some(drone.mean.value - mean_truth(drone)?);
+    }
+    let outside = |time_s: f64| levelled.is_none_or(|levelled| levelled.is_outside(time_s));
+    let pairs = map.time_s.iter().zip(drone.updraft_mps.iter().zip(truth));
+    let compared = pairs.filter(|(time_s, _)| outside(**time_s));
+    mean(compared.filter_map(|(_, (estimate, truth))| Some((*estimate)? - (*truth)?)))
+}
+
+/// ` outside of the stretch that sets the zero`, where there is one: over that the mean is zero by what was asked for.
+pub(in crate::report) fn where_compared(map: &UpdraftMap) -> &'static str {
+    let has_zero = map.levelled.as_ref().is_some_and(|levelled| levelled.zero_s.is_some());
+    if has_zero { " outside of the stretch that sets the zero" } else { "" }
 }
 
 /// Mean of the usable values.
@@ -52,7 +77,7 @@ fn instants(map: &UpdraftMap) -> Vec<Instant> {
                 .filter_map(|drone| drone.updraft_mps.get(index).copied().flatten());
             let truths = map.drones.iter().filter_map(|drone| {
                 drone.updraft_mps.get(index).copied().flatten()?;
-                drone.truth_mps.as_ref()?.get(index).copied()
+                drone.truth_at(index)
             });
             let posterior = map
                 .drones

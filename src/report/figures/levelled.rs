@@ -59,7 +59,9 @@ pub(in crate::report) fn figure(
         caption.push_str(&sentence(&words));
     }
     let name = format!("levelled-{key}");
-    let title = format!("The air beside an instrument, {}", clean(&flight.name));
+    let known = map.drones.iter().any(|drone| drone.truth_mps.is_some());
+    let what = if known { "The air beside an instrument" } else { "The air at the drones" };
+    let title = format!("{what}, {}", clean(&flight.name));
     Some(Figure { svg: sheet.svg(&name, &title), name, title, caption })
 }
 
@@ -87,7 +89,7 @@ fn panel(
     let truth: Option<Vec<(f64, f64)>> = drone
         .truth_mps
         .as_ref()
-        .map(|truth| map.time_s.iter().copied().zip(truth.iter().copied()).collect());
+        .map(|truth| map.time_s.iter().copied().zip(truth.iter().map(value)).collect());
     let wide = band(if truth.is_some() { apart_mps } else { 0.0 });
     let reach = wide.iter().flat_map(|(_, low, high)| [*low, *high]);
     let reach = reach.chain(truth.iter().flatten().map(|(_, value)| *value)).filter(|v| usable(*v));

@@ -67,7 +67,7 @@ fn points(map: &UpdraftMap, drone: &DroneUpdraft) -> Vec<WayPoint> {
             way_m,
             value_mps,
             interval_mps: drone.interval_mps.get(index).copied().flatten(),
-            truth_mps: drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied()),
+            truth_mps: drone.truth_at(index),
         });
     }
     points

@@ -135,8 +135,23 @@ fn largest_error(map: &UpdraftMap) -> Option<Doubt> {
     ))
 }
 
-/// Intervals that the true air of a simulated flight leaves too often.
+/// Intervals that the true air of a simulated flight leaves too often, or what an instrument read those for its place.
 fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
+    if let Some(held) = map.levelled.as_ref().and_then(|levelled| levelled.held_out.as_ref()) {
+        // The air at an instrument is not that at the drone: its values are held against the bar for its place.
+        let share = held.inside_share_there;
+        return (share < LEAST_INSIDE).then(|| {
+            (
+                1,
+                format!(
+                    "The errors are too small here: only {} % of what the instrument read lies inside the 95 % intervals \
+                     for its place, {} m away.",
+                    fixed(100.0 * share, 0),
+                    fixed(held.distance_m, 0)
+                ),
+            )
+        });
+    }
     let posterior = map.posterior.as_ref().and_then(|posterior| posterior.truth);
     let truth = posterior.or(map.truth).filter(|truth| truth.values > 0)?;
     let inside = truth.inside_share.filter(|share| usable(*share))?;

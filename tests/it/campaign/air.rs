@@ -39,7 +39,7 @@ fn pairs(map: &UpdraftMap) -> Vec<(f64, f64)> {
             let truth = drone.truth_mps.clone().unwrap_or_default();
             drone.updraft_mps.clone().into_iter().zip(truth)
         })
-        .filter_map(|(estimate, truth)| Some((estimate?, truth)))
+        .filter_map(|(estimate, truth)| Some((estimate?, truth?)))
         .collect()
 }
 

@@ -134,6 +134,24 @@ fn a_wrong_table_is_refused_with_its_line() {
     assert_snapshot!(told);
 }
 
+/// Lines that end with CR and LF are counted as others, and the first of them is read.
+#[test]
+fn tables_of_windows_have_the_same_lines() {
+    let bench = Bench::new();
+    for line in [2, 31] {
+        let mut rows = table();
+        let mut cells: Vec<&str> = rows[line - 1].split(',').collect();
+        cells[1] = "fast";
+        rows[line - 1] = cells.join(",");
+        for row in &mut rows {
+            row.push('\r');
+        }
+        let ended = analyze(&bench, 5, MAPPING, &rows);
+        let words = format!("line {line}, column \"motor 1\": \"fast\" is not a number");
+        assert!(ended.err.contains(&words), "{words}: {ended}");
+    }
+}
+
 #[test]
 fn a_table_that_is_missing_or_too_large() {
     let bench = Bench::new();

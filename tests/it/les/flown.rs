@@ -88,7 +88,7 @@ fn a_map_flown_in_a_models_air_is_the_models_air() {
             let truth = drone.truth_mps.clone().unwrap();
             drone.updraft_mps.clone().into_iter().zip(truth)
         })
-        .filter_map(|(estimate, truth)| Some((estimate?, truth)))
+        .filter_map(|(estimate, truth)| Some((estimate?, truth?)))
         .collect();
     let rho = correlation(&pairs);
     assert!(pairs.len() > 4 * 70 && rho > 0.95, "{} values, correlation {rho}", pairs.len());

@@ -29,7 +29,7 @@ fn every_drone_and_second_is_a_row() {
         first[..8],
         ["hover", "95", "1", "Drone 1", "-21.00", "-21.00", "100.00", &expected]
     );
-    assert_eq!(first[12], format!("{:.4}", drone.truth_mps.as_ref().unwrap()[0]));
+    assert_eq!(first[12], format!("{:.4}", drone.truth_at(0).unwrap()));
     let silent = map.drones.iter().find(|drone| drone.slot == Some(20)).unwrap();
     assert!(silent.updraft_mps[400].is_none());
     let gap = text.lines().find(|line| line.starts_with("hover,495,20,")).unwrap();

@@ -361,7 +361,7 @@ fn numbers_that_are_none_do_no_harm() {
                         0 => drone.mean = Estimate::new(bad, 0.1),
                         1 => drone.mean.se = bad,
                         2 => drone.position_m = Some([bad, 0.0]),
-                        _ => drone.truth_mps = Some(vec![bad; 3]),
+                        _ => drone.truth_mps = Some(vec![Some(bad); 3]),
                     }
                 }
             }

@@ -454,7 +454,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             posterior_sd_mps: Vec::new(),
             posterior_mean: None,
             quality: Vec::new(),
-            truth_mps: Some(truth),
+            truth_mps: Some(truth.into_iter().map(Some).collect()),
             place: None,
             wind: None,
         }));
