@@ -197,7 +197,7 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
         Called::Silent => {
             let why = match (one.said_visible, one.z) {
                 (Some(false), _) => {
-                    " The verdict says itself that this flight does not show so little of it."
+                    " The verdict says itself that this flight does not show so small a change."
                 }
                 (_, Some(z)) if z < 4.0 => " At this size it hardly rises above air and noise.",
                 _ => "",

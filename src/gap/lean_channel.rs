@@ -78,10 +78,16 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
             Some(told) if nats > CLASS_NATS => of_body(told, &before.vehicle)?,
             _ => {
                 let place = Role::RotorDrag.place()?;
+                let Interval { value, low, high } = wind.lean_per_mps?;
+                let beside = beside_rotor_drag(&before.vehicle, wind.model_lean_per_mps);
                 vec![Fitted {
                     name: place.parameter.name.to_owned(),
                     unit: place.parameter.unit.to_owned(),
-                    value: wind.lean_per_mps?,
+                    value: Interval {
+                        value: value - beside,
+                        low: low - beside,
+                        high: high - beside,
+                    },
                     before: Role::RotorDrag.value(&before.vehicle),
                 }]
             }
@@ -102,6 +108,16 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         shape: None,
         in_field: None,
     })
+}
+
+/// What a vehicle leans by besides the drag of its rotors, rad/(m/s): the frame of ArduPilot's simulator has a drag of its own, and so
+/// has the momentum of the air that goes through rotors. A drag of the rotors that the leans tell comes on top of it.
+fn beside_rotor_drag(vehicle: &Vehicle, model_lean_per_mps: f64) -> f64 {
+    if vehicle.airframe.sitl.is_some() || Role::MomentumDrag.is_on(vehicle) {
+        model_lean_per_mps - Role::RotorDrag.value(vehicle).unwrap_or(0.0)
+    } else {
+        0.0
+    }
 }
 
 /// Whether a body is told by itself: no drag of the rotors explains as much, by twice the margin of a class.
@@ -223,5 +239,31 @@ mod tests {
         assert_eq!(told(0.002, 1e-4), None, "nobody would notice");
         assert_eq!(told(0.02, f64::INFINITY), None);
         assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
+    }
+
+    #[test]
+    fn a_drag_that_leans_tell_comes_on_top_of_the_frame_s_own() {
+        let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let mut named = |vehicle: Vehicle| {
+            let model = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+            comparison.vehicle = vehicle;
+            let law = LeanLaw { linear: model.linear + 0.03, ..model };
+            comparison.wind.measured = Some(Measured { law, linear_se: 1e-3, misfit_nats: 0.0 });
+            let step = step(&comparison, &found(&comparison), 0.005).unwrap();
+            let Finding::Class { parameters, .. } = step.finding else { panic!() };
+            (parameters[0].value.value, model.linear)
+        };
+        let (size, own) = named(crate::vehicle::library::builtin("arducopter-sitl").unwrap());
+        assert!(own > 0.02, "the frame leans in wind by itself: {own}");
+        assert!((size - 0.03).abs() < 0.003, "{size}");
+        let mut with_momentum = trial::vehicle();
+        Role::MomentumDrag.set(&mut with_momentum, 0.2);
+        let (size, own) = named(with_momentum);
+        assert!(own > 0.02, "{own}");
+        assert!((size - 0.03).abs() < 1e-9, "{size}");
+        // Rotors that have a drag in the file have all of it named.
+        let mut with_drag = trial::vehicle();
+        Role::RotorDrag.set(&mut with_drag, 0.02);
+        assert!((named(with_drag).0 - 0.05).abs() < 1e-9);
     }
 }

@@ -238,6 +238,9 @@ mod tests {
              are left; noise and air alone would leave 6.0."
         );
         assert!(summary(6.4, 2.25).starts_with("Nothing is missing"), "nobody would miss it");
+        let cautions = vec![Warning::OtherWind { lean_deg: 5.0 }];
+        let in_two_winds = crate::gap::words::summary(&Verdict { cautions, ..Verdict::default() });
+        assert!(in_two_winds.starts_with("The two sides flew in different wind"), "{in_two_winds}");
         assert!(summary(9.0, 1.5).starts_with("Nothing is missing"), "noise may leave it");
     }
 

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use super::dependence::Dependence;
 use super::verdict::{Finding, Fitted, Step, Verdict, is_strong_wind};
+use super::warning::Warning;
 use crate::effects::Role;
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
@@ -113,6 +114,11 @@ fn velocity_error(verdict: &Verdict) -> String {
     }
 }
 
+/// Whether simulated logs were flown in another wind than the measured ones.
+fn flew_in_other_wind(verdict: &Verdict) -> bool {
+    verdict.cautions.iter().any(|caution| matches!(caution, Warning::OtherWind { .. }))
+}
+
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
@@ -120,6 +126,10 @@ pub fn summary(verdict: &Verdict) -> String {
         "Something is missing, and this comparison cannot say what.".to_owned()
     } else if verdict.steps.is_empty() && is_strong_wind && verdict.gap.left_over().is_some() {
         "This flight cannot tell whether something is missing.".to_owned()
+    } else if verdict.steps.is_empty() && flew_in_other_wind(verdict) {
+        "The two sides flew in different wind: what that explains, this comparison cannot tell, and beside it nothing \
+         is missing that this flight could show."
+            .to_owned()
     } else if verdict.steps.is_empty() {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
         format!(

@@ -23,7 +23,7 @@ separate, unknowns, and effects that matter at their usual size but were too sma
 elements of a flight (counter-phase, shuffled and repeated rungs, horizontal legs, hovers at two
 heights, a low hover, staggered charge, payload) it composes the shortest flight that answers them
 in the noise that was found, and simulates it with each answer in turn. Exit code 5: there is no
-verdict, or nothing to ask.")]
+verdict, nothing to ask, or no flight of these elements that would tell.")]
 pub(super) struct NextArgs {
     /// Campaign folder that `updraft gap` has analysed
     campaign: PathBuf,

@@ -139,6 +139,13 @@ fn make_room(folder: &Path, force: bool) -> Result<(), WorkflowError> {
             play::flight(folder).shown()
         )));
     }
+    let is_empty = || folder.read_dir().map_or(true, |mut entries| entries.next().is_none());
+    if !is_game && !play::is_played(folder) && !is_empty() {
+        return Err(WorkflowError::Usage(format!(
+            "{} is not empty, and holds no game; choose another folder with -o",
+            folder.shown()
+        )));
+    }
     if is_game {
         let removed = |path: &Path, done: std::io::Result<()>| match done {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

@@ -1,6 +1,6 @@
 //! Choice of the flight to compare, and of the model.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Request;
 use crate::analysis::TruthSeries;
@@ -163,14 +163,50 @@ pub(super) fn model_of(request: &Request, found: &Found) -> Result<Vehicle, Work
             return Ok(library::load(&folder.vehicle().to_string_lossy())?);
         }
     }
+    if let Some(file) = request.plan.as_deref().and_then(vehicle_beside) {
+        return Ok(library::load(&file.to_string_lossy())?);
+    }
     match &found.plan {
-        Some(plan) => Ok(library::load(&plan.vehicle)?),
+        Some(plan) => library::load(&plan.vehicle).map_err(|error| {
+            WorkflowError::Usage(format!(
+                "{error} (the plan's vehicle); give its file with --vehicle"
+            ))
+        }),
         None => Ok(library::load(UNPLANNED_VEHICLE)?),
     }
+}
+
+/// The vehicle's file in the folder of the flight that a plan is of.
+fn vehicle_beside(plan: &Path) -> Option<PathBuf> {
+    let folder = if plan.is_dir() { plan } else { plan.parent()? };
+    let own = FlightFolder(folder.to_owned()).vehicle();
+    let of_campaign = || match campaign::flights(folder).ok()?.as_slice() {
+        [flight] => Some(flight.vehicle()),
+        _ => None,
+    };
+    Some(own).filter(|file| file.is_file()).or_else(of_campaign).filter(|file| file.is_file())
 }
 
 /// Warning about logs without a plan.
 pub(super) fn unplanned(request: &Request, found: &Found, vehicle: &Vehicle) -> Option<Warning> {
     (request.vehicle.is_none() && request.tables.is_none() && found.plan.is_none())
         .then(|| Warning::VehicleGuessed { vehicle: vehicle.name.clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vehicle_of_a_plan_lies_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = folder.path().join("plan.json");
+        std::fs::write(&plan, "{}").unwrap();
+        assert_eq!(vehicle_beside(&plan), None);
+        let vehicle = FlightFolder(folder.path().to_owned()).vehicle();
+        std::fs::write(&vehicle, "").unwrap();
+        assert_eq!(vehicle_beside(&plan), Some(vehicle.clone()), "of its file");
+        assert_eq!(vehicle_beside(folder.path()), Some(vehicle), "of the flight's folder");
+        assert_eq!(vehicle_beside(&folder.path().join("elsewhere/plan.json")), None);
+    }
 }

@@ -20,6 +20,16 @@ fn hide(bench: &Bench, more: &[&str]) -> Ended {
     bench.expect(0, &[&SMALL[..], more].concat())
 }
 
+#[test]
+fn a_folder_with_something_else_in_it_is_left_alone() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("mine")).unwrap();
+    fs::write(bench.path("mine/notes.txt"), "mine").unwrap();
+    let refused = bench.expect(2, &[&SMALL[..], &FEW, &["--nothing", "-o", "mine"]].concat());
+    assert!(refused.err.contains("mine is not empty, and holds no game"), "{refused}");
+    assert_eq!(fs::read_dir(bench.path("mine")).unwrap().count(), 1);
+}
+
 fn naming(effect: &str, parameter: &str, value: f64) -> Verdict {
     let parameters = vec![fitted(parameter, value)];
     let mut verdict =
