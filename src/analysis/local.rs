@@ -100,12 +100,13 @@ fn spread(drones: &[Option<Own>], rough: f64) -> Matrix4<f64> {
     let known: Vec<Vector4<f64>> = drones.iter().flatten().map(|own| own.value).collect();
     let n = known.len().max(1) as f64;
     let usual = [CONSTANT_SD_US, SLOPE_SHARE_SD * rough, OWN_BEND_SD, OWN_BEND_SD];
-    let mut spread = Matrix4::from_diagonal(&Vector4::from(usual.map(|sd| sd * sd)));
+    let mut spread = Matrix4::from_diagonal(&Vector4::from(usual.map(|sd| sd * sd / n)));
     for value in &known {
         spread += value * value.transpose();
     }
-    // Weighs as one degree of freedom; the fleet's mean took one of the n.
-    spread * ((1.0 + 1.0 / n) / n)
+    // The usual spread weighs as one n-th of a degree of freedom: with 21 drones known, a whole one would still have doubled that of
+    // slopes which differ by 2 %. The fleet's mean took one of the n.
+    spread * ((1.0 + 1.0 / n) / (n - 1.0 + 1.0 / n))
 }
 
 impl Deviations<'_> {
