@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn what_wind_does_to_the_pulse_is_no_air_of_single_seconds() {
         // Gusts of the air that change every second, and a wind that comes and goes in a minute.
-        let air = |second: usize| if second % 2 == 0 { 0.3 } else { -0.3 };
+        let air = |second: usize| if second.is_multiple_of(2) { 0.3 } else { -0.3 };
         let wind = |second: f64| (second / 60.0 * std::f64::consts::TAU).sin();
         let (slope, start_s) = (20.0, 7.0);
         let seconds: Vec<Option<(f64, f64)>> = (0..120)
