@@ -104,8 +104,8 @@ fn spread(drones: &[Option<Own>], rough: f64) -> Matrix4<f64> {
     for value in &known {
         spread += value * value.transpose();
     }
-    // The usual spread weighs as one n-th of a degree of freedom: with 21 drones known, a whole one would still have doubled that of
-    // slopes which differ by 2 %. The fleet's mean took one of the n.
+    // The usual spread weighs as one n-th of a degree of freedom: with 21 drones known, a whole one would still have doubled the
+    // variance of slopes which differ by 2 %. The fleet's mean took one of the n.
     spread * ((1.0 + 1.0 / n) / (n - 1.0 + 1.0 / n))
 }
 

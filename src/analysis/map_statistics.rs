@@ -60,9 +60,7 @@ impl HoverSeen {
             records: None,
         }
     }
-}
 
-impl HoverSeen {
     /// Vertical air speeds of single seconds by one slope of the pulse, m/s, but for a constant. With `corrected` they move
     /// as the map's values do over running means: what wind that comes and goes does to a leaning drone is no air.
     fn values_mps(

@@ -1,12 +1,10 @@
 //! Errors of the values that each drone gives alone, widened by what the whole flight says about their zero.
 
 use super::budget::{CommonError, ErrorBudget};
+use super::posterior::half_mps;
 use super::result::{DroneUpdraft, UpdraftMap};
 use super::truth;
 use crate::numeric::mean;
-
-/// Standard errors to each side of a normal 95 % interval.
-const NORMAL: f64 = 1.96;
 
 /// Widens the errors of the drones' own values to what the posterior of the same map makes of them.
 ///
@@ -19,7 +17,7 @@ pub(super) fn widen(map: &mut UpdraftMap) {
     if let Some(common) = &mut map.common {
         *common = CommonError {
             se_mps: common.se_mps.hypot(missing_mps),
-            half_width_mps: common.half_width_mps.hypot(NORMAL * missing_mps),
+            half_width_mps: common.half_width_mps.hypot(half_mps(missing_mps)),
             zero_mps: common.zero_mps.hypot(missing_mps),
             ..*common
         };
@@ -33,7 +31,7 @@ pub(super) fn widen(map: &mut UpdraftMap) {
 /// Standard error that is missing in the common error of the drones' own values, m/s; `None` if there is none.
 fn missing_mps(map: &UpdraftMap) -> Option<f64> {
     let fleet = map.posterior.as_ref()?.fleet?;
-    let stated = map.common?.half_width_mps / NORMAL;
+    let stated = map.common?.half_width_mps / half_mps(1.0);
     let apart = map.drones.iter().flat_map(|drone| {
         let both = drone.updraft_mps.iter().zip(&drone.posterior_mps);
         both.filter_map(|(own, posterior)| Some((*own)? - (*posterior)?))
@@ -45,8 +43,8 @@ fn missing_mps(map: &UpdraftMap) -> Option<f64> {
 fn widen_drone(drone: &mut DroneUpdraft, missing_mps: f64) {
     let wider = |value: f64, [low, high]: [f64; 2]| {
         [
-            value - (value - low).hypot(NORMAL * missing_mps),
-            value + (high - value).hypot(NORMAL * missing_mps),
+            value - (value - low).hypot(half_mps(missing_mps)),
+            value + (high - value).hypot(half_mps(missing_mps)),
         ]
     };
     drone.errors = ErrorBudget {
@@ -98,10 +96,10 @@ mod tests {
         for se in [drone.mean.se, drone.errors.total_mps, drone.errors.zero_mps, common.se_mps] {
             assert!((se - total).abs() < 1e-12, "{se} instead of {total}");
         }
-        assert!((common.half_width_mps - NORMAL * total).abs() < 1e-12);
+        assert!((common.half_width_mps - half_mps(total)).abs() < 1e-12);
         let [low, high] = drone.interval_mps[0].unwrap();
-        assert!((low - (0.5 - NORMAL * total)).abs() < 1e-12, "{low}");
-        assert!(high > 0.5 + NORMAL * total, "the upper side was the wider one before: {high}");
+        assert!((low - (0.5 - half_mps(total))).abs() < 1e-12, "{low}");
+        assert!(high > 0.5 + half_mps(total), "the upper side was the wider one before: {high}");
         assert_eq!(drone.interval_mps[1], None);
         assert_eq!(drone.updraft_mps[0], Some(0.5), "values stay");
         assert_eq!(found.truth.unwrap().inside_share, Some(1.0), "counted again");

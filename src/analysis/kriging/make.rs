@@ -46,12 +46,11 @@ const STILL_MPS: f64 = 0.2;
 /// leaves, before its scales are known.
 const OWN_MPS: f64 = 0.08;
 
-/// Drones' means that lie apart by so many times what their constants explain are asked of air that lasts. Chosen: a fleet of nine
-/// has it by chance less than once in a hundred. With 1.25 the likeliest scales of fields of 145 m, which are rough
-/// from drone to drone, moved to others that are as likely, and stated less error.
-const LASTING: f64 = 1.75;
 /// A gradient of the drones' constants in the search for scales, m/s per m: likewise.
 const GRADIENT_MPS_PER_M: f64 = 0.005;
+/// Drones' means that lie apart by so many times what their constants explain are asked of air that lasts. Chosen: a fleet of nine
+/// has it by chance less than once in a hundred.
+const LASTING: f64 = 1.75;
 
 /// A flight's values with its calibration.
 pub(in super::super) struct Input<'a> {
