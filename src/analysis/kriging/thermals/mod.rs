@@ -46,6 +46,8 @@ const QUIET: f64 = -1.2;
 const FEWEST_DRONES: usize = 3;
 /// Share of the peak from which on a drone meets it.
 const MET: f64 = 0.2;
+/// Directions across which the places are measured that a thermal is seen from.
+const ACROSS: usize = 8;
 /// What a calibration leaves of the zero, and an updraft that is everywhere the same, m/s: with an open zero the tail of a
 /// wide thermal cannot be told from it. The standard error of calibrations in moving air (docs/errors.md).
 const ZERO_MPS: f64 = 0.3;
@@ -255,10 +257,10 @@ impl Looked<'_> {
         if second.log_odds < WORTH_A_LOOK {
             return None;
         }
-        let starts = first.into_iter().chain([second]).filter(|start| is_met(rows, start));
+        let starts = first.into_iter().chain([second]).filter(|start| is_told(rows, start));
         starts
             .filter_map(|start| self.refined(rows, region, start, scales))
-            .filter(|one| is_met(rows, &one.candidate))
+            .filter(|one| is_told(rows, &one.candidate))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }
 
@@ -335,6 +337,30 @@ fn without(rows: &Rows, candidate: &Candidate) -> Rows {
         .zip(record)
         .map(|(row, share)| Row { value_mps: row.value_mps - candidate.peak_mps * share, ..*row });
     Rows { list: own.collect(), ..rows.clone() }
+}
+
+/// Whether these values can tell a thermal.
+fn is_told(rows: &Rows, candidate: &Candidate) -> bool {
+    is_met(rows, candidate) && is_spanned(rows, candidate)
+}
+
+/// Whether the places that a thermal is seen from, as it drifts by, are at least as wide as its radius. What is wider than they
+/// are is a slope of any smooth field: three of 37 fleets of nine drones over 14 m found a thermal of 26 to 35 m in fields
+/// that had none.
+fn is_spanned(rows: &Rows, candidate: &Candidate) -> bool {
+    let shape = Shape::new(&candidate.numbers, candidate.at_s);
+    let places: Vec<[f64; 2]> =
+        rows.list.iter().map(|row| shape.off_m(row.spot.place_m, row.spot.time_s)).collect();
+    (0..ACROSS).all(|step| {
+        let (sin, cos) = (std::f64::consts::PI * step as f64 / ACROSS as f64).sin_cos();
+        let (least, most) = places
+            .iter()
+            .map(|[x, y]| x * cos + y * sin)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
+                (least.min(at), most.max(at))
+            });
+        most - least >= shape.core_radius_m()
+    })
 }
 
 /// Whether enough drones meet a thermal.

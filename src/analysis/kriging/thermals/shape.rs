@@ -81,11 +81,15 @@ impl Shape {
         (1.0 - self.sink * s) * (-s.powf(self.edge)).exp()
     }
 
+    /// From the core to a place, m.
+    pub(super) fn off_m(&self, place_m: [f64; 3], time_s: f64) -> [f64; 2] {
+        let off_s = time_s - self.at_s;
+        [0, 1].map(|axis| place_m[axis] - self.core_m[axis] - self.drift_mps[axis] * off_s)
+    }
+
     /// Mean over the 10 s around a time of who is at a place then and moves so fast.
     pub(super) fn mean(&self, place_m: [f64; 3], time_s: f64, velocity_mps: [f64; 3]) -> f64 {
-        let off_s = time_s - self.at_s;
-        let off =
-            [0, 1].map(|axis| place_m[axis] - self.core_m[axis] - self.drift_mps[axis] * off_s);
+        let off = self.off_m(place_m, time_s);
         let relative = [0, 1].map(|axis| velocity_mps[axis] - self.drift_mps[axis]);
         let square = |[x, y]: [f64; 2]| (x * x + y * y) / (self.radius_m * self.radius_m);
         let way = square(relative).sqrt() * RUNNING_S;
