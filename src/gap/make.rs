@@ -16,6 +16,7 @@ use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
     SIDE_GUSTS, SLOPES, WHITE,
 };
+use super::other_plan::without_strangers;
 use super::refine::Parameter;
 use super::regimes::regimes;
 use super::sensor::sensor;
@@ -74,7 +75,12 @@ const SAME_SPEED_MPS: f64 = 0.05;
 pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapError> {
     let exponent = super::compare::thrust_exponent(input.vehicle);
     let mut data = match input.plan {
-        Some(plan) => Data::of_plan(plan, input.flown, exponent),
+        Some(plan) => {
+            let (own, strangers) = without_strangers(plan, input.flown, input.simulated)?;
+            let mut data = Data::of_plan(plan, &own, exponent);
+            data.left_out.extend(strangers);
+            data
+        }
         None => Data::of_logs(input.flown, input.table, exponent),
     };
     if data.drones() == 0 {

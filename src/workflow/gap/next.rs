@@ -109,7 +109,13 @@ pub(crate) fn run(host: &dyn Host, wish: &Wish) -> Result<Proposed, WorkflowErro
     let folder = wish.output.clone().unwrap_or_else(|| wish.compared());
     create_folder(&folder)?;
     let _lock = host.lock(&folder)?;
-    let text = choice.elements.template(&choice.plan, &before.word, &head(&next), &next.briefing);
+    let text = choice.elements.template(
+        next.title(),
+        &choice.plan,
+        &before.word,
+        &head(&next),
+        &next.briefing,
+    );
     let path = folder.join(TEMPLATE);
     let flight = planned(&path, &text)?;
     let show = flight.plan.to_show();
@@ -378,7 +384,8 @@ fn notes(
 fn head(next: &Next) -> Vec<String> {
     let mut head = vec![
         format!(
-            "The flight that would tell: made by `updraft gap next` from the verdict on {}.",
+            "{}: made by `updraft gap next` from the verdict on {}.",
+            next.title(),
             next.flight
         ),
         String::new(),
@@ -387,6 +394,9 @@ fn head(next: &Next) -> Vec<String> {
             next.wanted_z
         ),
     ];
+    if let Some(falls) = next.shortfall() {
+        head.insert(1, format!("As predicted, {falls}."));
+    }
     for asked in &next.questions {
         head.push(format!(
             "  {:5.1} -> {:5.1}  {}",
@@ -426,11 +436,12 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
     };
     let all = with.questions.iter().zip(&with.choice.predicted).zip(&mut next.questions);
     for ((question, predicted), asked) in all {
-        if question.kind() == Kind::TooSmall && !asked.reached {
-            // It would not be found, and that is said already.
+        let answers = answers(question, &with.before.model, predicted);
+        if let Some(why) = not_simulated(asked, answers.len()) {
+            next.notes.push(format!("not simulated ({}): {why}", asked.question));
             continue;
         }
-        for answer in answers(question, &with.before.model, predicted) {
+        for answer in answers {
             host.check_stop()?;
             host.say(&format!("Simulating it with {} ...", answer.effect));
             let stop = Some(host.stop_flag());
@@ -438,6 +449,21 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
         }
     }
     Ok(())
+}
+
+/// Why a question's answers are not simulated; `None`: they are.
+fn not_simulated(asked: &Asked, answers: usize) -> Option<String> {
+    if asked.kind == Kind::TooSmall && !asked.reached {
+        let often = match asked.flights_needed {
+            Some(flights) => format!("; {flights} such flights would reach it"),
+            None => String::new(),
+        };
+        return Some(format!(
+            "one flight with z {:.1} of the {:.1} that are wanted would hardly find it{often}",
+            asked.proposed_z, asked.wanted_z
+        ));
+    }
+    (answers == 0).then(|| "what is not in the library cannot be flown".to_owned())
 }
 
 #[cfg(test)]
