@@ -10,7 +10,7 @@ use super::data::{Data, Group};
 use super::error::GapError;
 use super::generic::climb_shapes;
 use super::gls::{Column, Pulses};
-use super::lean::{self, LeanLaw, Wind, mean_wind, wind, wind_by};
+use super::lean::{self, LeanLaw, Wind, mean_wind, mean_wind_by, wind, wind_by};
 use super::lean_fit::Body;
 use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
@@ -183,7 +183,10 @@ impl Comparison {
                 air(near.wind.mean_mps)
             }
             Some(near) => {
-                let wind_mps = mean_wind(&near.data, law, Some((&near.side, near.flown_mps)));
+                // What its side lacks of its steady leans it lacks by the law that it was flown with.
+                let flown_law = lean_law(&near.vehicle, amsl_m, near.flown_mps[2]);
+                let flown = Some((near.side.as_slice(), near.flown_mps));
+                let wind_mps = mean_wind_by(&near.data, law, flown_law, flown);
                 air(flyable(data, law, wind_mps))
             }
             None => {
@@ -213,6 +216,19 @@ impl Comparison {
             return Err(GapError::NothingCommon);
         }
         let blown = wind(&data, law, Some((&side, flown_mps)));
+        eprintln!(
+            "DBG of drones {} near {} updraft {updraft_mps} first {first:?} flown {flown_mps:?} read {:?} law {:?} effects {:?}",
+            data.drones(),
+            near.is_some(),
+            blown.mean_mps,
+            law,
+            vehicle
+                .effects
+                .iter()
+                .filter(|(_, t)| t.on)
+                .map(|(n, t)| format!("{n}{:?}", t.parameters))
+                .collect::<Vec<_>>()
+        );
         let scene = Scene::measured(&data, &side, &blown, amsl_m).answering(as_flown.as_ref());
         let simulated_scene =
             scene.in_updraft(flown_updraft_mps).simulated(&data, &side, flown_mps);

@@ -345,7 +345,17 @@ pub(super) fn mean_wind(
     law: LeanLaw,
     flown: Option<(&[Vec<BinValues>], [f64; 3])>,
 ) -> [f64; 2] {
-    MeanWind::of(data, &settled_leans(data, law, flown), law, flown.is_some()).mean_mps
+    mean_wind_by(data, law, law, flown)
+}
+
+/// As [`mean_wind`], by a law other than the one by which the simulated side was flown.
+pub(super) fn mean_wind_by(
+    data: &Data,
+    law: LeanLaw,
+    flown_law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
+) -> [f64; 2] {
+    MeanWind::of(data, &settled_leans(data, flown_law, flown), law, flown.is_some()).mean_mps
 }
 
 /// Mean leans of each group, by bin, less what they lack of their steady values, rad.
