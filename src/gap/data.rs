@@ -564,6 +564,35 @@ mod tests {
     }
 
     #[test]
+    fn a_simulated_drone_stands_for_the_half_that_it_flew_with() {
+        let mut data = trial::data(2, |_, _| 0.0);
+        let mut other = data.groups[0].clone();
+        for bin in &mut other.bins {
+            bin.velocity_mps[2] = -bin.velocity_mps[2];
+        }
+        for value in other.measured.iter_mut().flatten() {
+            (value.climb_mps, value.height_m) = (-value.climb_mps, 80.0);
+        }
+        data.groups.push(other);
+        // Both hover at once, at two heights.
+        let flew = |of: usize| -> Vec<bool> {
+            let own = |group: &Group| -> Vec<Option<BinValues>> {
+                let values = group.bins.iter().zip(&data.groups[of].measured[0]);
+                let is_flown = |bin: &Bin, value: &BinValues| bin.climb_mps() == value.climb_mps;
+                values.map(|(bin, value)| is_flown(bin, value).then_some(*value)).collect()
+            };
+            let drone: Vec<Vec<Option<BinValues>>> = data.groups.iter().map(own).collect();
+            data.flown_as(&drone)
+        };
+        assert_eq!(flew(0), [true, false]);
+        assert_eq!(flew(1), [false, true]);
+        // Groups that are told the same share what was simulated.
+        data.groups[1] = data.groups[0].clone();
+        assert_eq!(data.flown_as(&data.as_flown()), [true, true]);
+        assert_eq!(data.flown_as(&[vec![None; 16], vec![None; 16]]), [false, false]);
+    }
+
+    #[test]
     fn a_pulse_that_never_moves_is_of_no_rotor() {
         let mut data = trial::data(3, |_, _| 0.0);
         for value in &mut data.groups[0].measured[1] {

@@ -564,6 +564,33 @@ mod tests {
     }
 
     #[test]
+    fn what_a_side_lacks_of_its_steady_lean_is_lacking_by_its_own_law() {
+        let vehicle = trial::vehicle();
+        let flown_law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+        let law = LeanLaw { linear: flown_law.linear + 0.03, ..flown_law };
+        let wind_mps = [3.0, -1.0];
+        let mut data = trial::data(2, |_, _| 0.0);
+        for group in &mut data.groups {
+            for drone in &mut group.measured {
+                for (bin, value) in group.bins.iter().zip(drone) {
+                    value.lean_rad = flown_law.lean([-wind_mps[0], -wind_mps[1]], bin.climb_mps());
+                }
+            }
+        }
+        // Simulated in the same wind, and steady: the other law reads the leans as they are.
+        let side: Vec<Vec<BinValues>> =
+            data.groups.iter().map(|group| group.measured[0].clone()).collect();
+        let flown = Some((side.as_slice(), [wind_mps[0], wind_mps[1], 0.0]));
+        let read = mean_wind_by(&data, law, flown_law, flown);
+        let as_they_are = mean_wind(&data, law, None);
+        let off_mps = (read[0] - as_they_are[0]).hypot(read[1] - as_they_are[1]);
+        assert!(off_mps < 1e-6, "{read:?} for {as_they_are:?}");
+        let own = mean_wind(&data, flown_law, flown);
+        assert!((own[0] - wind_mps[0]).abs() < 0.1, "{own:?}");
+        assert!(own[0] - read[0] > 0.5, "who leans more leans so in less wind: {read:?}");
+    }
+
+    #[test]
     fn rotors_whose_drag_goes_with_the_flow_lean_by_their_trim_in_any_wind() {
         let mut vehicle = builtin("pixel").unwrap();
         Role::RotorDrag.set(&mut vehicle, 0.008);

@@ -77,3 +77,44 @@ fn bins_of(flight: &Flight, steps: Option<&Steps>) -> Vec<Bin> {
     });
     pieces.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Series;
+
+    /// A flight that was told these vertical velocities, m/s, for 20 s each.
+    fn told(speeds: &[f64]) -> Flight {
+        let time_s: Vec<f64> = (0..200 * speeds.len()).map(|tick| 0.1 * tick as f64).collect();
+        let value = time_s.iter().map(|time| speeds[(time / 20.0) as usize]).collect();
+        Flight { desired_up_mps: Some(Series { time_s, value }), ..Flight::default() }
+    }
+
+    /// The slots of each group.
+    fn slots(flights: &[Flight]) -> Vec<Vec<u16>> {
+        let flown: Vec<Flown<'_>> =
+            flights.iter().zip(1..).map(|(flight, slot)| Flown { slot, flight }).collect();
+        let groups = groups(&flown, None);
+        groups.iter().map(|(_, members)| members.iter().map(|one| one.slot).collect()).collect()
+    }
+
+    const UP: [f64; 6] = [0.0, 1.0, -1.0, 0.0, 2.0, -2.0];
+    const DOWN: [f64; 6] = [0.0, -1.0, 1.0, 0.0, -2.0, 2.0];
+
+    #[test]
+    fn halves_in_counter_phase_are_two_groups() {
+        let flights = [told(&UP), told(&DOWN), told(&UP), told(&DOWN)];
+        assert_eq!(slots(&flights), [[1, 3], [2, 4]]);
+        assert_eq!(slots(&[told(&UP), told(&UP)]), [[1, 2]]);
+    }
+
+    #[test]
+    fn who_went_home_early_is_no_group() {
+        let early = told(&[0.0, 1.0, -0.5, -0.5, 0.0, 0.0]);
+        let flights = [told(&UP), early, told(&UP), told(&UP)];
+        assert_eq!(slots(&flights), [[1, 2, 3, 4]]);
+        let without_commands = Flight::default();
+        assert_eq!(slots(&[told(&UP), without_commands, told(&UP)]), [[1, 2, 3]]);
+        assert_eq!(slots(&[Flight::default()]), [[1]]);
+    }
+}

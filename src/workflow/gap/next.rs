@@ -495,8 +495,8 @@ mod tests {
         }
     }
 
-    fn refused(questions: Vec<Asked>) -> Option<String> {
-        let next = Next {
+    fn proposal(questions: Vec<Asked>) -> Next {
+        Next {
             schema: NEXT_SCHEMA.to_owned(),
             made_by: String::new(),
             flight: String::new(),
@@ -510,8 +510,40 @@ mod tests {
             questions,
             predicted_flights: 1,
             notes: Vec::new(),
-        };
+        }
+    }
+
+    fn refused(questions: Vec<Asked>) -> Option<String> {
+        let next = proposal(questions);
         refuse_untold(&next, Path::new("campaign/gap")).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_flight_that_falls_short_says_so_and_why_it_was_not_simulated() {
+        let mut next = proposal(vec![asked(true, &[])]);
+        assert_eq!((next.title(), next.shortfall()), ("The flight that would tell", None));
+        assert_eq!(not_simulated(&next.questions[0], 2), None);
+        let short = Asked {
+            kind: Kind::TooSmall,
+            question: "is there battery of the usual size?".to_owned(),
+            proposed_z: 3.2,
+            flights_needed: Some(3),
+            ..asked(false, &[])
+        };
+        let why = not_simulated(&short, 1).unwrap();
+        assert_eq!(
+            why,
+            "one flight with z 3.2 of the 5.0 that are wanted would hardly find it; 3 such flights would reach it"
+        );
+        assert!(not_simulated(&Asked { kind: Kind::Unknown, ..asked(true, &[]) }, 0).is_some());
+        next.questions.push(short);
+        next.reaches = false;
+        assert_eq!(next.title(), "The flight that would tell most, and not enough");
+        let lines = head(&next);
+        assert!(lines[0].starts_with("The flight that would tell most, and not enough: "));
+        assert_eq!(lines[1], "As predicted, it falls short in 1 of 2 questions, by z 1.8.");
+        let text = crate::report::next_terminal::text(&next);
+        assert!(text.starts_with("The flight that would tell most, and not enough\n"), "{text}");
     }
 
     #[test]
