@@ -264,13 +264,13 @@ mod tests {
         assert_eq!(told(0.02, 5e-3), None, "four standard errors are a hint");
         assert_eq!(told(0.002, 1e-4), None, "nobody would notice");
         assert_eq!(told(0.02, f64::INFINITY), None);
+        assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
         let mut hinted = |linear_se: f64| {
             let law = LeanLaw { linear: model.linear + 0.02, ..model };
             comparison.wind.measured = Some(Measured { law, linear_se, misfit_nats: 0.0 });
             hint(&comparison, &found(&comparison), 0.005).is_some()
         };
         assert!(hinted(5e-3) && !hinted(1e-2));
-        assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
     }
 
     #[test]

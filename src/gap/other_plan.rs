@@ -114,7 +114,7 @@ mod tests {
         let segments = &own.groups[0].segments;
         let is_other = |flight: &Flight| flew_instead(flight, segments).is_some();
         assert!(!is_other(&as_planned(&own, 0.0)));
-        let hovers = plan("calibration", &[Override::new("parameters.hover_s", 15.0)]);
+        let hovers = plan("calibration", &[Override::new("hover_s", 15.0)]);
         assert!(is_other(&as_planned(&hovers, 0.0)), "rungs at other times");
         assert!(is_other(&as_planned(&plan("calibration-counterphase", &[]), 0.0)));
         assert!(is_other(&told(&own, |_| Some(0.0))), "a hover");
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn half_of_the_logs_are_another_plan_and_fewer_are_left_out() {
         let own = plan("calibration", &[]);
-        let other = plan("calibration", &[Override::new("parameters.hover_s", 15.0)]);
+        let other = plan("calibration", &[Override::new("hover_s", 15.0)]);
         let flights = [as_planned(&own, 0.0), as_planned(&other, 0.0)];
         let fleet = |which: [usize; 4]| {
             let flown: Vec<Flown<'_>> = which
