@@ -77,7 +77,9 @@ pub fn exit_of(error: &CommandError) -> Exit {
             _ => Exit::Usage,
         },
         E::Gap(error) => match error {
-            GapError::NoSimulatedSide | GapError::Effect(_) => Exit::Usage,
+            GapError::NoSimulatedSide | GapError::OtherPlan { .. } | GapError::Effect(_) => {
+                Exit::Usage
+            }
             GapError::Simulation(_) => Exit::Failed,
             _ => Exit::Nothing,
         },

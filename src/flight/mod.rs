@@ -43,6 +43,7 @@ use crate::base::time::GpsTime;
 use crate::log::{Log, LogError, ScanStats};
 use crate::mission::plan::Segment;
 
+pub(crate) use align::planned_up_mps;
 pub use fit::share_flown;
 pub use identity::{Belongs, Identity, identify};
 pub use indicator::{Effort, Indicator};

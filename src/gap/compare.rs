@@ -10,7 +10,7 @@ use super::data::{Data, Group};
 use super::error::GapError;
 use super::generic::climb_shapes;
 use super::gls::{Column, Pulses};
-use super::lean::{self, LeanLaw, Wind, mean_wind, wind, wind_by};
+use super::lean::{self, LeanLaw, Wind, mean_wind, mean_wind_by, wind, wind_by};
 use super::lean_fit::Body;
 use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
@@ -183,7 +183,10 @@ impl Comparison {
                 air(near.wind.mean_mps)
             }
             Some(near) => {
-                let wind_mps = mean_wind(&near.data, law, Some((&near.side, near.flown_mps)));
+                // What its side lacks of its steady leans it lacks by the law that it was flown with.
+                let flown_law = lean_law(&near.vehicle, amsl_m, near.flown_mps[2]);
+                let flown = Some((near.side.as_slice(), near.flown_mps));
+                let wind_mps = mean_wind_by(&near.data, law, flown_law, flown);
                 air(flyable(data, law, wind_mps))
             }
             None => {
@@ -197,14 +200,32 @@ impl Comparison {
         // it after a climb or a descent at the end of what the vehicle can lean.
         let rounds = if matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
         let within_mps = if moves { READ_WITHIN_MPS } else { HOVERS_READ_WITHIN_MPS };
-        for _ in 0..rounds {
+        // A reading can run away from what was flown: then what is flown next is halfway to it from where both were nearest.
+        let mut nearest: Option<Reading> = None;
+        for round in 0..=rounds {
             let whole = data.keep(|group, bin| values[group][bin].is_some());
             let read = mean_wind(&whole, law, Some((&flat(&values), flown_mps)));
             let read = air(flyable(data, law, read));
-            if (read[0] - flown_mps[0]).hypot(read[1] - flown_mps[1]) < within_mps {
+            let apart_mps = (read[0] - flown_mps[0]).hypot(read[1] - flown_mps[1]);
+            if rounds == 0 || apart_mps < within_mps {
+                nearest = None;
                 break;
             }
-            (flown_mps, values) = (read, fly(read)?);
+            let next_mps = match &mut nearest {
+                Some(best) if best.apart_mps <= apart_mps => best.halfway(),
+                _ => {
+                    let values = std::mem::take(&mut values);
+                    nearest = Some(Reading { apart_mps, flown_mps, values, towards_mps: read });
+                    read
+                }
+            };
+            if round == rounds {
+                break;
+            }
+            (flown_mps, values) = (next_mps, fly(next_mps)?);
+        }
+        if let Some(best) = nearest {
+            (flown_mps, values) = (best.flown_mps, best.values);
         }
         let has = |group: usize, bin: usize| values[group][bin].is_some();
         let data = data.keep(has);
@@ -654,6 +675,25 @@ impl Comparison {
     /// Effects of a vehicle that are not valid.
     pub fn change(&self, from: &Vehicle, to: &Vehicle) -> Result<Column, EffectError> {
         Ok(self.scene_of(to).pulses(to)?.less(&self.scene_of(from).pulses(from)?))
+    }
+}
+
+/// A wind that was flown in, and what was read from the leans then.
+struct Reading {
+    /// How far the two are apart, m/s.
+    apart_mps: f64,
+    flown_mps: [f64; 3],
+    values: Vec<Vec<Option<BinValues>>>,
+    /// Air that is flown in next, m/s.
+    towards_mps: [f64; 3],
+}
+
+impl Reading {
+    /// Half of the way to where it led to, each time less.
+    fn halfway(&mut self) -> [f64; 3] {
+        let towards = self.flown_mps.iter().zip(&mut self.towards_mps);
+        towards.for_each(|(flown, towards)| *towards = f64::midpoint(*flown, *towards));
+        self.towards_mps
     }
 }
 

@@ -1,12 +1,11 @@
 //! Measured values: all drones of a campaign's flight, in steady bins that are common to each
 //! group.
 
-use super::bins::{Bin, BinValues, cut, of_segments};
+use super::bins::{Bin, BinValues, of_segments};
 use super::left_out::LeftOut;
 use super::measure::measured;
 use super::steady::IDLE_US;
-use crate::analysis::steps::steady;
-use crate::analysis::windows::inferred;
+use super::unplanned;
 use crate::flight::Flight;
 use crate::flight::table::Steps;
 use crate::mission::plan::{Plan, Slot};
@@ -20,6 +19,12 @@ const DRONE_SHARE: f64 = 0.9;
 /// Drones are neighbours within this many grid spacings: includes the diagonal (1.41), excludes the next but
 /// one (2). Geometry.
 const NEXT_SPACINGS: f64 = 1.5;
+/// Heights above home that differ by less are the same, m: heights of two programs differ by some metres where their
+/// ground does. Chosen.
+const SAME_HEIGHT_M: f64 = 5.0;
+/// A simulated drone flew as each group did whose bins it has, and at whose heights it was, by this share of its best
+/// group: some bins are lost to gaps and limits. Chosen.
+const AS_GOOD: f64 = 0.95;
 
 /// Log of one drone, with its slot.
 #[derive(Debug)]
@@ -133,31 +138,23 @@ impl Data {
         data
     }
 
-    /// Drones without a plan: bins from the first log's own commands, or, of a table that has none, from
-    /// its velocity.
+    /// Drones without a plan, in groups that were told the same: bins from the own commands of each group's first log,
+    /// or, of a table that has none, from its velocity.
     pub fn of_logs(flown: &[Flown<'_>], steps: Option<&Steps>, thrust_exponent: f64) -> Self {
         let mut data = Self::default();
-        let bins: Vec<Bin> = flown
-            .iter()
-            .map(|one| match steps {
-                Some(steps) if one.flight.desired_up_mps.is_none() => steady(one.flight, steps),
-                _ => inferred(one.flight),
-            })
-            .find(|targets| !targets.is_empty())
-            .unwrap_or_default()
-            .iter()
-            .enumerate()
-            .flat_map(|(index, target)| {
-                let velocity = [0.0, 0.0, target.commanded_mps];
-                cut(target.kind, target.start_s, target.end_s, velocity, index)
-            })
-            .collect();
-        let values = flown
-            .iter()
-            .map(|one| (one.slot, [0.0; 2], measured(one.flight, &bins, 0.0, thrust_exponent)))
-            .collect();
-        let armed_s = first_armed_s(flown.iter().map(|one| one.flight));
-        data.add("all", &bins, values, armed_s);
+        let groups = unplanned::groups(flown, steps);
+        for (index, (bins, members)) in groups.iter().enumerate() {
+            let values = members
+                .iter()
+                .map(|one| (one.slot, [0.0; 2], measured(one.flight, bins, 0.0, thrust_exponent)))
+                .collect();
+            let armed_s = first_armed_s(members.iter().map(|one| one.flight));
+            let name = match groups.len() {
+                1 => "all".to_owned(),
+                _ => format!("group {}", index + 1),
+            };
+            data.add(&name, bins, values, armed_s);
+        }
         data.resistance_ohm = resistance_ohm(flown);
         data
     }
@@ -186,24 +183,44 @@ impl Data {
         data
     }
 
-    /// These bins in the logs of an external simulation, averaged over its drones. `None`: it lacks the bin.
+    /// These bins in the logs of an external simulation, averaged over its drones that flew as the group did.
+    /// `None`: these lack the bin.
     pub fn averaged(
         &self,
         flown: &[Flown<'_>],
         thrust_exponent: f64,
     ) -> Vec<Vec<Option<BinValues>>> {
-        self.groups
-            .iter()
-            .map(|group| {
-                let all: Vec<Vec<Option<BinValues>>> = flown
-                    .iter()
-                    .map(|one| measured(one.flight, &group.bins, 0.0, thrust_exponent))
-                    .collect();
-                (0..group.bins.len())
-                    .map(|bin| average(all.iter().filter_map(|drone| drone[bin].as_ref())))
-                    .collect()
-            })
-            .collect()
+        let of_drone = |one: &Flown<'_>| -> Vec<Vec<Option<BinValues>>> {
+            let own = |group: &Group| measured(one.flight, &group.bins, 0.0, thrust_exponent);
+            self.groups.iter().map(own).collect()
+        };
+        let drones: Vec<Vec<Vec<Option<BinValues>>>> = flown.iter().map(of_drone).collect();
+        let flew: Vec<Vec<bool>> = drones.iter().map(|drone| self.flown_as(drone)).collect();
+        let side = |(index, group): (usize, &Group)| {
+            let members = || drones.iter().zip(&flew).filter(move |(_, flew)| flew[index]);
+            let bin =
+                |bin: usize| average(members().filter_map(|(drone, _)| drone[index][bin].as_ref()));
+            (0..group.bins.len()).map(bin).collect()
+        };
+        self.groups.iter().enumerate().map(side).collect()
+    }
+
+    /// Whether a simulated drone, by its values in the bins of each group, flew as the group did. Its number need not
+    /// be a slot of the measured fleet, so what it flew decides: halves in counter phase hover together, but at other
+    /// heights.
+    fn flown_as(&self, drone: &[Vec<Option<BinValues>>]) -> Vec<bool> {
+        let share = |(group, values): (&Group, &Vec<Option<BinValues>>)| {
+            let is_near = |bin: usize, own: &BinValues| {
+                (own.height_m - group.mean(bin, |one| one.height_m)).abs() < SAME_HEIGHT_M
+            };
+            let there = values.iter().enumerate().filter_map(|(bin, own)| Some((bin, (*own)?)));
+            let score: f64 =
+                there.map(|(bin, own)| if is_near(bin, &own) { 2.0 } else { 1.0 }).sum();
+            score / values.len().max(1) as f64
+        };
+        let shares: Vec<f64> = self.groups.iter().zip(drone).map(share).collect();
+        let most = shares.iter().copied().fold(0.0, f64::max);
+        shares.iter().map(|share| *share >= AS_GOOD * most && most > 0.0).collect()
     }
 
     fn add(
@@ -544,6 +561,35 @@ mod tests {
         assert_eq!(data.groups[0].bins.len(), 9, "three of five");
         assert_eq!(data.groups[0].bins[3].start_s, trial::ladder()[4].start_s);
         assert_eq!(slots(&data), [1, 2, 3, 4, 5], "it is nobody's hole then");
+    }
+
+    #[test]
+    fn a_simulated_drone_stands_for_the_half_that_it_flew_with() {
+        let mut data = trial::data(2, |_, _| 0.0);
+        let mut other = data.groups[0].clone();
+        for bin in &mut other.bins {
+            bin.velocity_mps[2] = -bin.velocity_mps[2];
+        }
+        for value in other.measured.iter_mut().flatten() {
+            (value.climb_mps, value.height_m) = (-value.climb_mps, 80.0);
+        }
+        data.groups.push(other);
+        // Both hover at once, at two heights.
+        let flew = |of: usize| -> Vec<bool> {
+            let own = |group: &Group| -> Vec<Option<BinValues>> {
+                let values = group.bins.iter().zip(&data.groups[of].measured[0]);
+                let is_flown = |bin: &Bin, value: &BinValues| bin.climb_mps() == value.climb_mps;
+                values.map(|(bin, value)| is_flown(bin, value).then_some(*value)).collect()
+            };
+            let drone: Vec<Vec<Option<BinValues>>> = data.groups.iter().map(own).collect();
+            data.flown_as(&drone)
+        };
+        assert_eq!(flew(0), [true, false]);
+        assert_eq!(flew(1), [false, true]);
+        // Groups that are told the same share what was simulated.
+        data.groups[1] = data.groups[0].clone();
+        assert_eq!(data.flown_as(&data.as_flown()), [true, true]);
+        assert_eq!(data.flown_as(&[vec![None; 16], vec![None; 16]]), [false, false]);
     }
 
     #[test]

@@ -45,6 +45,22 @@ pub enum GapError {
         /// Value of the pulse, us.
         value_us: f64,
     },
+    /// The logs do not follow the plan.
+    #[error(
+        "{wrong} of {of} {whose} do not follow the plan{}\n  give the plan that they flew (--plan), or the logs of \
+         this plan",
+        listed(.reasons)
+    )]
+    OtherPlan {
+        /// Whose logs they are: of the drones, or of another simulation.
+        whose: &'static str,
+        /// Number of logs that do not.
+        wrong: usize,
+        /// Number of logs.
+        of: usize,
+        /// What each of them flew instead.
+        reasons: Vec<LeftOut>,
+    },
     /// There is neither a plan nor logs of a simulation.
     #[error(
         "there is nothing to compare with: give the plan that was flown (--plan), so that it can \

@@ -345,7 +345,17 @@ pub(super) fn mean_wind(
     law: LeanLaw,
     flown: Option<(&[Vec<BinValues>], [f64; 3])>,
 ) -> [f64; 2] {
-    MeanWind::of(data, &settled_leans(data, law, flown), law, flown.is_some()).mean_mps
+    mean_wind_by(data, law, law, flown)
+}
+
+/// As [`mean_wind`], by a law other than the one by which the simulated side was flown.
+pub(super) fn mean_wind_by(
+    data: &Data,
+    law: LeanLaw,
+    flown_law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
+) -> [f64; 2] {
+    MeanWind::of(data, &settled_leans(data, flown_law, flown), law, flown.is_some()).mean_mps
 }
 
 /// Mean leans of each group, by bin, less what they lack of their steady values, rad.
@@ -551,6 +561,33 @@ mod tests {
             let off = value - moments.mean - expected;
             assert!(off.abs() < 1e-9, "{value} {expected}");
         }
+    }
+
+    #[test]
+    fn what_a_side_lacks_of_its_steady_lean_is_lacking_by_its_own_law() {
+        let vehicle = trial::vehicle();
+        let flown_law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+        let law = LeanLaw { linear: flown_law.linear + 0.03, ..flown_law };
+        let wind_mps = [3.0, -1.0];
+        let mut data = trial::data(2, |_, _| 0.0);
+        for group in &mut data.groups {
+            for drone in &mut group.measured {
+                for (bin, value) in group.bins.iter().zip(drone) {
+                    value.lean_rad = flown_law.lean([-wind_mps[0], -wind_mps[1]], bin.climb_mps());
+                }
+            }
+        }
+        // Simulated in the same wind, and steady: the other law reads the leans as they are.
+        let side: Vec<Vec<BinValues>> =
+            data.groups.iter().map(|group| group.measured[0].clone()).collect();
+        let flown = Some((side.as_slice(), [wind_mps[0], wind_mps[1], 0.0]));
+        let read = mean_wind_by(&data, law, flown_law, flown);
+        let as_they_are = mean_wind(&data, law, None);
+        let off_mps = (read[0] - as_they_are[0]).hypot(read[1] - as_they_are[1]);
+        assert!(off_mps < 1e-6, "{read:?} for {as_they_are:?}");
+        let own = mean_wind(&data, flown_law, flown);
+        assert!((own[0] - wind_mps[0]).abs() < 0.1, "{own:?}");
+        assert!(own[0] - read[0] > 0.5, "who leans more leans so in less wind: {read:?}");
     }
 
     #[test]

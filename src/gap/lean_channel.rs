@@ -23,6 +23,9 @@ const FORM: f64 = 0.001;
 /// Standard errors from which a difference is named: those of [`super::detectable`], at which an effect is
 /// found nearly always. Chosen.
 const NAMED_Z: f64 = 5.0;
+/// Standard errors from which leans point to a drag of the rotors that the pulse must tell. Chosen after one flight with a
+/// drag of four standard errors; how often flights without any have so much was not measured.
+const HINTED_Z: f64 = 2.5;
 
 /// Air speed of a leg, m/s: those of the templates.
 const LEG_MPS: f64 = 3.0;
@@ -45,17 +48,30 @@ pub(super) fn found(before: &Comparison) -> WindFound {
     }
 }
 
-/// What a measured linear part differs by from the model's in whichever updraft brings the two nearest, rad/(m/s):
-/// rotors that carry less in air that sinks lean more in the same wind, and no lean tells that updraft.
-fn apart(measured: LeanLaw, model: f64) -> f64 {
+/// The least and the most that a measured linear part is in the updrafts that a flight may be in, rad/(m/s): rotors that
+/// carry less in air that sinks lean more in the same wind, and no lean tells that updraft.
+fn in_updrafts(measured: LeanLaw) -> (f64, f64) {
     let lean_rad = |updraft_mps: f64| {
         LeanLaw { updraft_mps, ..measured }.lean([LEG_MPS, 0.0], 0.0)[0].max(f64::MIN_POSITIVE)
     };
     let here_rad = lean_rad(measured.updraft_mps);
-    let told = |updraft_mps: f64| measured.linear * here_rad / lean_rad(updraft_mps) - model;
+    let told = |updraft_mps: f64| measured.linear * here_rad / lean_rad(updraft_mps);
     let all = [told(measured.updraft_mps), told(-MOST_UPDRAFT_MPS), told(MOST_UPDRAFT_MPS)];
-    let (least, most) = extent(all).unwrap_or_default();
-    least.max(0.0) + most.min(0.0)
+    extent(all).unwrap_or_default()
+}
+
+/// What a measured linear part differs by from the model's in whichever updraft brings the two nearest, rad/(m/s).
+fn apart(measured: LeanLaw, model: f64) -> f64 {
+    let (least, most) = in_updrafts(measured);
+    (least - model).max(0.0) + (most - model).min(0.0)
+}
+
+/// An interval of a size that the leans told, widened by what the updraft of the flight may make of it.
+fn widened(of: Interval, measured: LeanLaw) -> Interval {
+    let (least, most) = in_updrafts(measured);
+    let (below, above) = (measured.linear - least, most - measured.linear);
+    let low = of.value - (of.value - of.low).hypot(below);
+    Interval { low, high: of.value + (of.high - of.value).hypot(above), ..of }
 }
 
 /// Effects that lean a drone alike at every speed over ground: rotors that flap, and air that gives up its momentum
@@ -67,18 +83,27 @@ pub(super) fn alike() -> Vec<String> {
 
 /// Drag that the model lacks, or has with another size: a class, because leans do not tell its kind.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
+    told(before, wind, alpha, NAMED_Z)
+}
+
+/// As [`step`], where the leans alone do not tell it: for a pulse that depends on the wind in a way that nothing explains.
+pub(super) fn hint(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
+    told(before, wind, alpha, HINTED_Z)
+}
+
+fn told(before: &Comparison, wind: &WindFound, alpha: f64, least_z: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     // Whose drag it is the speeds tell: that of rotors is linear, that of a body goes with the square.
     let body = before.body_told();
     let nats = body.map_or(f64::NEG_INFINITY, |(body, _)| body.better_nats);
     let apart = apart(measured.law, wind.model_lean_per_mps);
     let of_rotors = apart.abs() / measured.linear_se.hypot(FORM);
-    let (z, effects, parameters) = if apart.abs() >= MATERIAL && of_rotors >= NAMED_Z {
+    let (z, effects, parameters) = if apart.abs() >= MATERIAL && of_rotors >= least_z {
         let parameters = match body {
             Some(told) if nats > CLASS_NATS => of_body(told, &before.vehicle)?,
             _ => {
                 let place = Role::RotorDrag.place()?;
-                let Interval { value, low, high } = wind.lean_per_mps?;
+                let Interval { value, low, high } = widened(wind.lean_per_mps?, measured.law);
                 let beside = beside_rotor_drag(&before.vehicle, wind.model_lean_per_mps);
                 vec![Fitted {
                     name: place.parameter.name.to_owned(),
@@ -236,9 +261,33 @@ mod tests {
         assert_eq!(told(0.02, 1e-2), None, "it may be none");
         assert_eq!(told(0.0049, 1e-4), None, "the form of the drag may be another");
         assert!(told(0.0052, 1e-4).is_some());
+        assert_eq!(told(0.02, 5e-3), None, "four standard errors are a hint");
         assert_eq!(told(0.002, 1e-4), None, "nobody would notice");
         assert_eq!(told(0.02, f64::INFINITY), None);
         assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
+        let mut hinted = |linear_se: f64| {
+            let law = LeanLaw { linear: model.linear + 0.02, ..model };
+            comparison.wind.measured = Some(Measured { law, linear_se, misfit_nats: 0.0 });
+            hint(&comparison, &found(&comparison), 0.005).is_some()
+        };
+        assert!(hinted(5e-3) && !hinted(1e-2));
+    }
+
+    #[test]
+    fn an_interval_has_what_another_updraft_would_make_of_the_size() {
+        let law = |load: [f64; 2]| LeanLaw {
+            load,
+            ..LeanLaw::of(&trial::vehicle(), SEA_LEVEL_DENSITY, 0.0)
+        };
+        let of = Interval { value: 0.05, low: 0.047, high: 0.053 };
+        let round = |mps: f64| (1e4 * mps).round() / 1e4;
+        let ends = |linear: f64, load: [f64; 2]| {
+            let found = widened(of, LeanLaw { linear, ..law(load) });
+            (round(found.low), round(found.value), round(found.high))
+        };
+        assert_eq!(ends(0.05, [0.0; 2]), (0.047, 0.05, 0.053), "who leans alike in all of them");
+        // In air that sinks by 2 m/s the rotors carry a tenth more, and in air that rises a tenth less.
+        assert_eq!(ends(0.05, [0.05, 0.0]), (0.0442, 0.05, 0.0558));
     }
 
     #[test]

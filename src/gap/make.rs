@@ -16,15 +16,17 @@ use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
     SIDE_GUSTS, SLOPES, WHITE,
 };
+use super::other_plan::without_strangers;
 use super::refine::Parameter;
 use super::regimes::regimes;
+use super::search::FLOOR_NATS;
 use super::sensor::sensor;
-use super::stand_in::stand_in;
+use super::stand_in::{as_in_file, read_from_logs, stand_in};
 use super::verdict::{
     DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
     VERDICT_SCHEMA, Verdict,
 };
-use super::warning::warnings;
+use super::warning::{Warning, warnings};
 use super::words::summary;
 use crate::effects::Role;
 use crate::effects::select;
@@ -74,7 +76,12 @@ const SAME_SPEED_MPS: f64 = 0.05;
 pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapError> {
     let exponent = super::compare::thrust_exponent(input.vehicle);
     let mut data = match input.plan {
-        Some(plan) => Data::of_plan(plan, input.flown, exponent),
+        Some(plan) => {
+            let (own, strangers) = without_strangers(plan, input.flown, input.simulated)?;
+            let mut data = Data::of_plan(plan, &own, exponent);
+            data.left_out.extend(strangers);
+            data
+        }
         None => Data::of_logs(input.flown, input.table, exponent),
     };
     if data.drones() == 0 {
@@ -109,7 +116,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
     let before = Comparison::new(&data, vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
-    let leans = super::lean_channel::step(&before, &wind, options.alpha);
+    let mut leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(vehicle, &channel);
     if channel.named {
         // What is late may be the log alone: then the model must not be made late. So it is where no drone could have flown
@@ -123,7 +130,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
             repaired = vehicle.clone();
         }
     }
-    let answered = |repaired: &Vehicle| {
+    let answered = |repaired: &Vehicle, leans: &Option<Step>| {
         let mut repaired = repaired.clone();
         add_others(&mut repaired, leans.as_slice());
         add_bodies(&mut repaired, leans.as_slice());
@@ -137,16 +144,36 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         };
         question.answered(&train, &held)
     };
-    let (mut found, mut shrink) = match answered(&repaired) {
+    let (mut found, mut shrink) = match answered(&repaired, &leans) {
         Err(error) if error.is_not_flown() && channel.named && !channel.in_log => {
             channel.in_log = true;
-            answered(vehicle)?
+            answered(vehicle, &leans)?
         }
         answered => answered?,
     };
     if is_only_in_log(&channel, &shrink) {
         channel.in_log = true;
-        (found, shrink) = answered(vehicle)?;
+        (found, shrink) = answered(vehicle, &leans)?;
+    }
+    // Leans may point to a drag that they do not tell alone: what the pulse has left of the wind can be that drag's.
+    if leans.is_none()
+        && found.steps.iter().any(is_of_wind)
+        && let Some(hint) = super::lean_channel::hint(&before, &wind, options.alpha)
+    {
+        let repaired = if channel.named && !channel.in_log { &repaired } else { vehicle };
+        let hinted = Some(hint);
+        match answered(repaired, &hinted) {
+            Err(error) if !error.is_not_flown() => return Err(error),
+            Err(_) => {}
+            Ok((there, gap)) => {
+                let more_nats = there.explains()? - found.explains()?;
+                if more_nats > FLOOR_NATS && !grows(&gap) && !there.steps.iter().any(is_of_wind) {
+                    (found, shrink) = (there, gap);
+                    leans =
+                        hinted.map(|hint| Step { gain_nats: hint.gain_nats + more_nats, ..hint });
+                }
+            }
+        }
     }
     if shrink.left_over().is_some() {
         super::single::beside_what_nothing_explains(&mut found.steps);
@@ -198,7 +225,12 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         Role::MomentumDrag.is_of(one.effect) || of_body.as_deref() == Some(one.effect)
     };
     steps.extend(leans.filter(|_| !found.parameters.iter().any(instead)));
-    let cautions = warnings(&data, &found, &shrink, input);
+    let mut cautions = warnings(&data, &found, &shrink, input);
+    as_in_file(&mut steps, vehicle, input.vehicle);
+    if let Some((place, value)) = read_from_logs(vehicle, input.vehicle) {
+        let (effect, parameter) = (place.name().to_owned(), place.parameter.name.to_owned());
+        cautions.push(Warning::StandIn { effect, parameter, value });
+    }
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -305,6 +337,12 @@ fn model(vehicle: &Vehicle, found: &Found, steps: &[Step]) -> Vehicle {
         add_bodies(&mut model, steps);
     }
     model
+}
+
+/// Whether it is something unknown of the wind, or of how drones lean in it.
+fn is_of_wind(step: &Step) -> bool {
+    let Finding::Unknown { depends_on, .. } = &step.finding else { return false };
+    matches!(depends_on, Dependence::Wind | Dependence::Lean)
 }
 
 /// Whether an error of the velocity that was taken into the model's loop is the log's alone after all. Which of the two it

@@ -38,6 +38,7 @@ pub mod next;
 mod noise;
 #[cfg(test)]
 mod null_flights;
+mod other_plan;
 mod pack;
 mod power_channel;
 mod refine;
@@ -55,6 +56,7 @@ mod table;
 mod together;
 #[cfg(test)]
 mod trial;
+mod unplanned;
 pub mod verdict;
 mod warning;
 pub mod words;

@@ -12,6 +12,8 @@ use super::error::GapError;
 use super::lean::{LeanLaw, mean_wind, wind};
 use super::refly::mean_drone;
 use super::scene::Scene;
+use super::verdict::{Finding, Step};
+use crate::effects::role::Place;
 use crate::effects::{EffectError, Role};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -53,6 +55,36 @@ pub(super) fn stand_in(
     Ok(found)
 }
 
+/// What a stand-in has by the logs, of which the file has something else, or nothing: effect, parameter, value.
+pub(super) fn read_from_logs(stand_in: &Vehicle, file: &Vehicle) -> Option<(Place, f64)> {
+    let place = Role::FaceDragTop.place()?;
+    let value = Role::FaceDragTop.value(stand_in)?;
+    (Role::FaceDragTop.value(file) != Some(value)).then_some((place, value))
+}
+
+/// What findings say of the model before is what its file says, never what a stand-in had by the simulated logs.
+pub(super) fn as_in_file(steps: &mut [Step], stand_in: &Vehicle, file: &Vehicle) {
+    let Some((place, _)) = read_from_logs(stand_in, file) else { return };
+    let before = Role::FaceDragTop.value(file);
+    for step in steps {
+        let is_of = step.finding.effects().first() == Some(&place.name());
+        let (Finding::Name { parameters, .. } | Finding::Class { parameters, .. }) =
+            &mut step.finding
+        else {
+            continue;
+        };
+        for fitted in parameters.iter_mut().filter(|one| is_of && one.name == place.parameter.name)
+        {
+            fitted.before = before;
+        }
+        if let Finding::Name { was_there, .. } = &mut step.finding
+            && is_of
+        {
+            *was_there = before.is_some();
+        }
+    }
+}
+
 /// The simulated side as data of one drone in each group.
 fn as_data(data: &Data, values: &[Vec<Option<BinValues>>]) -> Data {
     let mut own = data.keep(|group, bin| values[group][bin].is_some());
@@ -84,4 +116,43 @@ pub(super) fn as_flown(
     let blown = wind(&data, law, Some((&side, air_mps)));
     let scene = Scene::measured(&data, &side, &blown, amsl_m).simulated(&data, &side, air_mps);
     AsFlown::of(&data, &side, &scene, flew)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::super::verdict::{Fitted, Interval};
+    use super::*;
+
+    #[test]
+    fn the_model_before_is_the_file_s_and_not_what_was_read_from_logs() {
+        let place = Role::FaceDragTop.place().unwrap();
+        let us = Interval { value: 1.2, low: 1.0, high: 1.4 };
+        let said = |stand_in: &Vehicle, file: &Vehicle| {
+            let fitted = Fitted {
+                name: place.parameter.name.to_owned(),
+                unit: String::new(),
+                value: us,
+                before: Role::FaceDragTop.value(stand_in),
+            };
+            let effect = place.name().to_owned();
+            let finding = Finding::Name { effect, parameters: vec![fitted], was_there: true };
+            let mut steps = vec![trial::step(finding, 50.0, &[])];
+            as_in_file(&mut steps, stand_in, file);
+            match &steps[0].finding {
+                Finding::Name { parameters, was_there, .. } => (parameters[0].before, *was_there),
+                other => panic!("{other:?}"),
+            }
+        };
+        let file = trial::vehicle();
+        let mut stand_in = file.clone();
+        Role::FaceDragTop.set(&mut stand_in, 3.0);
+        assert_eq!(said(&stand_in, &file), (None, false));
+        let mut other = file.clone();
+        Role::FaceDragTop.set(&mut other, 0.5);
+        assert_eq!(said(&stand_in, &other), (Some(0.5), true));
+        assert_eq!(said(&other, &other), (Some(0.5), true), "nothing was read from logs");
+        assert!(read_from_logs(&other, &other).is_none());
+        assert_eq!(read_from_logs(&stand_in, &file).map(|(_, value)| value), Some(3.0));
+    }
 }

@@ -6,6 +6,7 @@ use super::data::Data;
 use super::explain::Found;
 use super::make::Input;
 use super::verdict::{Gap, is_strong_wind};
+use super::words::short;
 use crate::base::said::said_in_files;
 use crate::effects::select::value_of;
 
@@ -66,6 +67,15 @@ pub enum Warning {
     OneGroup,
     /// The logs have no battery voltage at rest.
     NoRestingVoltage,
+    /// The model that stands for another program's simulation has another drag of its body than its file.
+    StandIn {
+        /// Name of the effect.
+        effect: String,
+        /// Name of the parameter.
+        parameter: String,
+        /// Value by the simulated logs.
+        value: f64,
+    },
     /// No plan says which vehicle flew.
     VehicleGuessed {
         /// Name of the vehicle that was assumed.
@@ -144,6 +154,12 @@ impl fmt::Display for Warning {
             ),
             Self::NoRestingVoltage => f.write_str(
                 "the logs have no voltage at rest (BAT.VoltR): battery sag is looked for by time alone",
+            ),
+            Self::StandIn { effect, parameter, value } => write!(
+                f,
+                "the simulated logs answer climbs as the model does with {effect}.{parameter} {}, so the model \
+                 has that to begin with; it is read from these logs, and in no file",
+                short(*value)
             ),
             Self::VehicleGuessed { vehicle } => write!(
                 f,

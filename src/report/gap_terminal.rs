@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::gap_parts::first_gap;
 use super::gap_words::{in_field, kind, left_over, lost, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
-use super::text::{clean, count, fixed, prose_width, reduced};
+use super::text::{clean, count, fixed, prose_width, reduced, signed};
 use crate::base::layout;
 use crate::gap::Verdict;
 use crate::gap::left_out::said_together;
@@ -17,6 +17,8 @@ const DIM: &str = "\u{1b}[2m";
 const YELLOW: &str = "\u{1b}[33m";
 const RESET: &str = "\u{1b}[0m";
 
+/// A smaller updraft is printed as none, m/s.
+const LEAST_UPDRAFT_MPS: f64 = 0.005;
 /// Rivals that are shown of each step.
 const RIVALS: usize = 4;
 
@@ -67,6 +69,7 @@ pub fn gap_summary(verdict: &Verdict, width: usize, color: bool) -> String {
         left_over(rest)
     };
     page.say("", &format!("Left: {left}; reduced chi2 {}", reduced(rest.reduced_chi2)), 2);
+    air(&mut page, verdict);
     gap(&mut page, verdict);
     undetectable(&mut page, &verdict.detectable);
     if !verdict.data.left_out.is_empty() {
@@ -141,6 +144,18 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
         .collect();
     if !rivals.is_empty() {
         page.say(DIM, &format!("  rivals: {}", rivals.join(", ")), 4);
+    }
+}
+
+/// The updraft of the whole flight, which the sizes and the gap depend on.
+fn air(page: &mut Page, verdict: &Verdict) {
+    let updraft_mps = verdict.noise.updraft_mps;
+    if updraft_mps.abs() >= LEAST_UPDRAFT_MPS {
+        let told = format!(
+            "Air: the whole flight is explained best in a uniform updraft of {} m/s",
+            signed(updraft_mps, 2)
+        );
+        page.say("", &told, 2);
     }
 }
 

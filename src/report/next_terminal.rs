@@ -3,7 +3,6 @@
 use super::table::{Align, column, lines};
 use super::text::clean;
 use crate::gap::next::Next;
-use crate::gap::next::result::Asked;
 
 /// Width of tables, columns.
 const WIDTH: usize = 100;
@@ -44,13 +43,17 @@ pub fn text(next: &Next) -> String {
             ]);
         }
     }
-    let mut out = lines(&columns, &rows, WIDTH);
+    let mut out = Vec::new();
+    if !next.reaches {
+        out.extend([next.title().to_owned(), String::new()]);
+    }
+    out.extend(lines(&columns, &rows, WIDTH));
     out.push(String::new());
     out.push(format!(
         "Flown: {:.0} s. Proposed: {:.0} s{}",
         next.present_s,
         next.proposed_s,
-        if next.reaches { String::new() } else { format!("; {}", misses(next)) }
+        next.shortfall().map_or_else(String::new, |falls| format!("; {falls}"))
     ));
     out.extend(next.why.iter().map(|why| format!("  {why}")));
     for asked in &next.questions {
@@ -59,20 +62,6 @@ pub fn text(next: &Next) -> String {
     out.extend(next.notes.iter().map(|note| format!("note: {}", clean(note))));
     out.push(String::new());
     out.join("\n")
-}
-
-fn misses(next: &Next) -> String {
-    let missed: Vec<&Asked> = next.questions.iter().filter(|asked| !asked.reached).collect();
-    format!(
-        "it falls short in {} of {} questions, by z {}",
-        missed.len(),
-        next.questions.len(),
-        missed
-            .iter()
-            .map(|asked| format!("{:.1}", asked.wanted_z - asked.proposed_z))
-            .collect::<Vec<_>>()
-            .join(", ")
-    )
 }
 
 fn verified(one: &crate::gap::next::result::Verified) -> String {

@@ -175,7 +175,7 @@ pub(super) fn of_gap(folder: &Path, campaign: Option<&Path>) -> Vec<PageLink> {
         PageLink::made_by(title, format!("../../{report}"), format!("updraft analyze {named}"))
     });
     links.push(PageLink::made_by(
-        "The flight that would tell what is left open",
+        "The flight to fly next, for what is left open",
         "../next.toml",
         format!("updraft gap next {named}"),
     ));

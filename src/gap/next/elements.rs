@@ -228,6 +228,7 @@ impl Elements {
     /// lines for its head; `vehicle` is the template's word for the vehicle.
     pub fn template(
         self,
+        title: &str,
         plan: &Plan,
         vehicle: &str,
         why: &[String],
@@ -242,7 +243,7 @@ impl Elements {
         }
         line("schema = \"updraft.template/1\"");
         line("name = \"next\"");
-        line("title = \"The flight that would tell\"");
+        line(&format!("title = {}", quoted(title)));
         line("purpose = \"calibration\"");
         line(&format!("vehicle = {}", quoted(vehicle)));
         if !briefing.is_empty() {

@@ -41,6 +41,34 @@ pub struct Next {
     pub notes: Vec<String>,
 }
 
+impl Next {
+    /// What the flight is, as a title: one that falls short tells most, and not enough.
+    pub fn title(&self) -> &'static str {
+        if self.reaches {
+            "The flight that would tell"
+        } else {
+            "The flight that would tell most, and not enough"
+        }
+    }
+
+    /// In how many questions the flight falls short and by what, as the rest of a sentence; `None`: in none.
+    pub fn shortfall(&self) -> Option<String> {
+        let missed: Vec<&Asked> = self.questions.iter().filter(|asked| !asked.reached).collect();
+        let by: Vec<String> = missed
+            .iter()
+            .map(|asked| format!("{:.1}", asked.wanted_z - asked.proposed_z))
+            .collect();
+        (!missed.is_empty()).then(|| {
+            format!(
+                "it falls short in {} of {} questions, by z {}",
+                missed.len(),
+                self.questions.len(),
+                by.join(", ")
+            )
+        })
+    }
+}
+
 /// One question.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

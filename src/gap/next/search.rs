@@ -236,7 +236,7 @@ impl<'a> FlightSearch<'a> {
     }
 
     fn plan(&self, elements: Elements) -> Result<Plan, GapError> {
-        let text = elements.template(self.present, self.vehicle, &[], &[]);
+        let text = elements.template("", self.present, self.vehicle, &[], &[]);
         let mission = resolve_text("next.toml", &text, &[]).map_err(Box::new)?;
         let flight = mission.flights.into_iter().next();
         flight.map(|flight| flight.plan).ok_or(GapError::NothingCommon)

@@ -26,7 +26,7 @@ use crate::campaign::to_json;
 use crate::effects::select::resolved;
 use crate::gap::left_out::said_together;
 use crate::gap::{Explained, GapError, Options, Verdict};
-use crate::report::{self, Provenance};
+use crate::report::{self, InputFile, Provenance};
 use crate::vehicle::Vehicle;
 
 /// Request for a comparison: measurement, simulation and model.
@@ -107,10 +107,15 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
     let root = root.cloned().unwrap_or_default();
     let settings = settings(request, &found, &vehicle);
     let work = Work { flights: vec![found], ..Work::new(&root) };
+    let mut read = provenance(host, &work, settings);
+    if let (Some(path), Some(simulated)) = (&request.simulated, simulated) {
+        let others = Work { flights: vec![simulated], ..Work::new(path) };
+        settings_of_simulated(&mut read, path, &others)?;
+    }
     let provenance = Provenance {
         seed: Some(request.options.seed),
         links: pages::of_gap(&folder, request.campaign.as_deref()),
-        ..provenance(host, &work, settings)
+        ..read
     };
     explained.verdict.data.logs_sha256 = logs_sha256(&work)?;
     let page = write(&folder, &explained, &provenance)?;
@@ -213,6 +218,22 @@ fn settings(request: &Request, found: &Found, vehicle: &Vehicle) -> Vec<(&'stati
         settings.push(("Seed of the flight", format!("{seed}: its logs are simulated")));
     }
     settings
+}
+
+/// The logs of another simulation with their hashes, for the page: their files beside the others', and the hash of all.
+fn settings_of_simulated(
+    page: &mut Provenance,
+    path: &Path,
+    work: &Work,
+) -> Result<(), WorkflowError> {
+    let logs = work.flights.iter().flat_map(|flight| &flight.logs);
+    for log in logs {
+        let sha256 = work.hashes.sha256(&log.path)?;
+        page.inputs.push(InputFile { path: log.path.shown().to_string(), sha256 });
+    }
+    let hash = format!("{} (SHA-256 of the list of their hashes)", logs_sha256(work)?);
+    page.settings.push((format!("Logs in {}", path.shown()), hash));
+    Ok(())
 }
 
 /// Writes verdict, model and page; where the page is.

@@ -109,7 +109,13 @@ pub(crate) fn run(host: &dyn Host, wish: &Wish) -> Result<Proposed, WorkflowErro
     let folder = wish.output.clone().unwrap_or_else(|| wish.compared());
     create_folder(&folder)?;
     let _lock = host.lock(&folder)?;
-    let text = choice.elements.template(&choice.plan, &before.word, &head(&next), &next.briefing);
+    let text = choice.elements.template(
+        next.title(),
+        &choice.plan,
+        &before.word,
+        &head(&next),
+        &next.briefing,
+    );
     let path = folder.join(TEMPLATE);
     let flight = planned(&path, &text)?;
     let show = flight.plan.to_show();
@@ -378,7 +384,8 @@ fn notes(
 fn head(next: &Next) -> Vec<String> {
     let mut head = vec![
         format!(
-            "The flight that would tell: made by `updraft gap next` from the verdict on {}.",
+            "{}: made by `updraft gap next` from the verdict on {}.",
+            next.title(),
             next.flight
         ),
         String::new(),
@@ -387,6 +394,9 @@ fn head(next: &Next) -> Vec<String> {
             next.wanted_z
         ),
     ];
+    if let Some(falls) = next.shortfall() {
+        head.insert(1, format!("As predicted, {falls}."));
+    }
     for asked in &next.questions {
         head.push(format!(
             "  {:5.1} -> {:5.1}  {}",
@@ -426,11 +436,12 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
     };
     let all = with.questions.iter().zip(&with.choice.predicted).zip(&mut next.questions);
     for ((question, predicted), asked) in all {
-        if question.kind() == Kind::TooSmall && !asked.reached {
-            // It would not be found, and that is said already.
+        let answers = answers(question, &with.before.model, predicted);
+        if let Some(why) = not_simulated(asked, answers.len()) {
+            next.notes.push(format!("not simulated ({}): {why}", asked.question));
             continue;
         }
-        for answer in answers(question, &with.before.model, predicted) {
+        for answer in answers {
             host.check_stop()?;
             host.say(&format!("Simulating it with {} ...", answer.effect));
             let stop = Some(host.stop_flag());
@@ -438,6 +449,21 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
         }
     }
     Ok(())
+}
+
+/// Why a question's answers are not simulated; `None`: they are.
+fn not_simulated(asked: &Asked, answers: usize) -> Option<String> {
+    if asked.kind == Kind::TooSmall && !asked.reached {
+        let often = match asked.flights_needed {
+            Some(flights) => format!("; {flights} such flights would reach it"),
+            None => String::new(),
+        };
+        return Some(format!(
+            "one flight with z {:.1} of the {:.1} that are wanted would hardly find it{often}",
+            asked.proposed_z, asked.wanted_z
+        ));
+    }
+    (answers == 0).then(|| "what is not in the library cannot be flown".to_owned())
 }
 
 #[cfg(test)]
@@ -469,8 +495,8 @@ mod tests {
         }
     }
 
-    fn refused(questions: Vec<Asked>) -> Option<String> {
-        let next = Next {
+    fn proposal(questions: Vec<Asked>) -> Next {
+        Next {
             schema: NEXT_SCHEMA.to_owned(),
             made_by: String::new(),
             flight: String::new(),
@@ -484,8 +510,40 @@ mod tests {
             questions,
             predicted_flights: 1,
             notes: Vec::new(),
-        };
+        }
+    }
+
+    fn refused(questions: Vec<Asked>) -> Option<String> {
+        let next = proposal(questions);
         refuse_untold(&next, Path::new("campaign/gap")).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_flight_that_falls_short_says_so_and_why_it_was_not_simulated() {
+        let mut next = proposal(vec![asked(true, &[])]);
+        assert_eq!((next.title(), next.shortfall()), ("The flight that would tell", None));
+        assert_eq!(not_simulated(&next.questions[0], 2), None);
+        let short = Asked {
+            kind: Kind::TooSmall,
+            question: "is there battery of the usual size?".to_owned(),
+            proposed_z: 3.2,
+            flights_needed: Some(3),
+            ..asked(false, &[])
+        };
+        let why = not_simulated(&short, 1).unwrap();
+        assert_eq!(
+            why,
+            "one flight with z 3.2 of the 5.0 that are wanted would hardly find it; 3 such flights would reach it"
+        );
+        assert!(not_simulated(&Asked { kind: Kind::Unknown, ..asked(true, &[]) }, 0).is_some());
+        next.questions.push(short);
+        next.reaches = false;
+        assert_eq!(next.title(), "The flight that would tell most, and not enough");
+        let lines = head(&next);
+        assert!(lines[0].starts_with("The flight that would tell most, and not enough: "));
+        assert_eq!(lines[1], "As predicted, it falls short in 1 of 2 questions, by z 1.8.");
+        let text = crate::report::next_terminal::text(&next);
+        assert!(text.starts_with("The flight that would tell most, and not enough\n"), "{text}");
     }
 
     #[test]

@@ -141,6 +141,58 @@ fn a_simulated_side_must_be_there_and_be_of_the_flight() {
 }
 
 #[test]
+fn logs_of_another_plan_are_refused() {
+    let bench = campaign();
+    let plan = ["plan", "calibration", "--grid", "2x2", "--quiet", "-o", "other"];
+    let ladder = ["--speeds", "1.5,2.5", "--leg", "15", "--hover", "10", "--baseline", "12"];
+    bench.expect(0, &[&plan[..], &ladder].concat());
+    bench.expect(0, &["simulate", "other", "--quiet"]);
+    let of_plan = ["--measured", "other/simulated", "--plan", "campaign"];
+    let refusal = refused(&bench, 2, &of_plan);
+    for words in [
+        "4 of 4 logs do not follow the plan",
+        "slots 1-4: ",
+        "planned 1 m/s, flown 1.50 m/s",
+        "give the plan that they flew (--plan)",
+    ] {
+        assert!(refusal.contains(words), "{words}: {refusal}");
+    }
+    let own = ["--measured", "campaign/simulated", "--plan", "campaign"];
+    let of_other = [&own[..], &["--simulated", "other/simulated"]].concat();
+    let refusal = refused(&bench, 2, &of_other);
+    assert!(refusal.contains("4 of 4 simulated logs do not follow the plan"), "{refusal}");
+    // One log in the wrong folder is left out.
+    fs::copy(bench.path("other/simulated/03.BIN"), bench.path("campaign/simulated/03.BIN"))
+        .unwrap();
+    let told = said(&bench, 3, &own);
+    assert!(
+        told.starts_with("drones 3\n") && told.contains("slot 3: this log does not belong"),
+        "{told}"
+    );
+}
+
+#[test]
+fn half_fleets_in_counter_phase_are_compared_with_their_own_half() {
+    let bench = Bench::new();
+    let fly = |seed: &str, folder: &str| {
+        let plan = ["plan", "calibration-counterphase", "--grid", "2x2", "--quiet", "-o", folder];
+        bench.expect(0, &[&plan[..], &["--speeds", "1,2"]].concat());
+        bench.expect(0, &["simulate", folder, "--quiet", "--seed", seed]);
+    };
+    fly("1", "one");
+    fly("2", "two");
+    let logs = ["--simulated", "one/simulated", "--measured", "two/simulated", "--json"];
+    for plan in [&["--plan", "one", "-o", "with"][..], &["-o", "without"]] {
+        let ended = bench.expect(0, &[&["gap"], &logs[..], plan].concat());
+        let verdict = &ended.json("updraft.gap/1")["verdict"];
+        assert_eq!(verdict["steps"].as_array().unwrap().len(), 0, "{plan:?}: {verdict}");
+        let groups = verdict["data"]["groups"].as_array().unwrap();
+        let drones: Vec<u64> = groups.iter().map(|group| group[1].as_u64().unwrap()).collect();
+        assert_eq!(drones, [2, 2], "{plan:?}");
+    }
+}
+
+#[test]
 fn a_hover_that_is_compared_is_not_its_own_map() {
     let bench = Bench::new();
     let run = ["run", "--direct", "--no-study", "--quiet", "--air", "still", "-o", "campaign"];

@@ -56,7 +56,7 @@ fn flown_by(known: &Known, elements: Elements, side: i64) -> Flight {
 }
 
 fn flown_plan(present: &Plan, elements: Elements) -> Plan {
-    let text = elements.template(present, VEHICLE, &[], &[]);
+    let text = elements.template("A flight", present, VEHICLE, &[], &[]);
     resolve_text("next.toml", &text, &[]).unwrap().flights.remove(0).plan
 }
 
@@ -76,7 +76,8 @@ fn every_set_of_elements_is_a_template_that_plans_and_passes_the_check() {
         // One element less from everything, and then on from there.
         open.extend(elements.simpler().into_iter().take(4));
         let why = ["because\nof \"this\"".to_owned()];
-        let text = elements.template(&present, VEHICLE, &why, &elements.briefing(&present));
+        let text =
+            elements.template("A flight", &present, VEHICLE, &why, &elements.briefing(&present));
         let flight = resolve_text("next.toml", &text, &[]).unwrap().flights.remove(0);
         assert_eq!(flight.plan.slots.len(), present.slots.len());
         assert_eq!(flight.plan.site, present.site);

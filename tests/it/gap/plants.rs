@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::cli::support::Bench;
+use updraft::base::digest::sha256;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/dataflash/tests/data").join(name)
@@ -26,6 +27,21 @@ fn what_two_plants_differ_in_is_named_though_it_is_several_things() {
     let names: Vec<(Option<&str>, Option<&str>)> =
         found.iter().map(|(kind, finding)| (kind.as_str(), finding["effect"].as_str())).collect();
     assert_eq!(names, [(Some("name"), Some("face-drag")), (Some("name"), Some("momentum-drag"))]);
+    // What the model that stands for the square plant has of it is read from that plant's logs, and in no file.
+    let body = &found[0].1;
+    assert_eq!(
+        (&body["was_there"], &body["parameters"][0]["before"]),
+        (&Value::from(false), &Value::Null)
+    );
+    assert!(!verdict["summary"].to_string().contains("the model had"), "{verdict}");
+    assert!(
+        verdict["cautions"].to_string().contains("answer climbs as the model does with face-drag.")
+    );
+    let page = std::fs::read_to_string(bench.path("gap/report/index.html")).unwrap();
+    for log in [&args[2], &args[4]] {
+        let sha256 = sha256(&std::fs::read(log).unwrap());
+        assert!(page.contains(&sha256), "the page has the hash of {log}");
+    }
     let (_, name) = &found[1];
     // The frame has 0.2 1/s.
     let value = &name["parameters"][0]["value"];

@@ -51,6 +51,16 @@ fn the_terminal_names_the_sensor() {
 }
 
 #[test]
+fn the_terminal_tells_the_updraft_that_was_found() {
+    let mut verdict = named();
+    verdict.noise.updraft_mps = -0.98;
+    let told = gap_summary(&verdict, 100, false);
+    assert!(told.contains("uniform updraft of −0.98 m/s"), "{told}");
+    verdict.noise.updraft_mps = 0.0;
+    assert!(!gap_summary(&verdict, 100, false).contains("uniform updraft"));
+}
+
+#[test]
 fn no_line_is_wider_than_the_terminal() {
     for verdict in all() {
         for width in [40, 64, 80, 100, 140] {

@@ -69,6 +69,11 @@ pub(in crate::report) fn figure(step: &Step, number: usize, format: Format) -> O
              hatched: free shapes, minus their penalty. Chance hardly ever reaches beyond the \
              dashed line. ",
         );
+        if step.rivals.iter().any(|rival| gain_nats(step, rival) != rival.gain_nats) {
+            caption.push_str(
+                "What was found is drawn with its gain beside the rest of what was found. ",
+            );
+        }
     }
     if shape.is_some() {
         let _ = write!(
@@ -88,6 +93,14 @@ fn is_found(step: &Step, rival: &Rival) -> bool {
     }
 }
 
+/// The gain that is drawn of a rival. What the step tells of has the gain that the step tells: effects that were found
+/// together gain beside each other, and another amount alone.
+fn gain_nats(step: &Step, rival: &Rival) -> f64 {
+    let first = step.finding.effects().first().copied();
+    let is_told = is_found(step, rival) && first.is_none_or(|name| name == rival.name);
+    if is_told { step.gain_nats } else { rival.gain_nats }
+}
+
 fn bars(step: &Step, number: usize, (room, format): (f64, Format)) -> Drawing {
     let mut drawing = Drawing::overlay(format);
     // Names, bars, and the number behind the longest.
@@ -104,7 +117,7 @@ fn bars(step: &Step, number: usize, (room, format): (f64, Format)) -> Drawing {
     let most = step
         .rivals
         .iter()
-        .map(|rival| rival.gain_nats)
+        .map(|rival| gain_nats(step, rival))
         .chain([step.threshold_nats, 1.0])
         .filter(|gain| usable(*gain))
         .fold(1.0, f64::max);
@@ -134,7 +147,8 @@ fn bars(step: &Step, number: usize, (room, format): (f64, Format)) -> Drawing {
         };
         let style = text(12.0, INK, Anchor::End, found);
         drawing.text([bars_left - 8.0, y + 13.5], &shortened(&words, letters), style, 0.0);
-        let end = at(rival.gain_nats);
+        let gain = gain_nats(step, rival);
+        let end = at(gain);
         let (fill, stroke) = match (found, rival.generic) {
             (true, _) => (BLUE, ""),
             (false, true) => (hatch.as_str(), "stroke=\"#b4bcc4\""),
@@ -144,7 +158,7 @@ fn bars(step: &Step, number: usize, (room, format): (f64, Format)) -> Drawing {
         // Beside the line of the threshold, not on it.
         let number_at = if end < line + 2.0 && end + NUMBER > line { line } else { end };
         let style = text(12.0, MUTED, Anchor::Start, false);
-        let gain = minus(&format!("{:.1}", rival.gain_nats));
+        let gain = minus(&format!("{gain:.1}"));
         drawing.text([number_at + 6.0, y + 13.5], &gain, style, 0.0);
     }
     drawing.polyline(
@@ -200,6 +214,31 @@ fn curve(shape: &Shape, letter: &str) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_gain_of_what_was_found_is_drawn_as_it_is_told() {
+        let rival = |name: &str, generic: bool, gain_nats: f64| Rival {
+            name: name.to_owned(),
+            generic,
+            gain_nats,
+        };
+        let effect = "face-drag".to_owned();
+        let step = Step {
+            finding: Finding::Name { effect, parameters: Vec::new(), was_there: false },
+            gain_nats: 36.8,
+            threshold_nats: 8.0,
+            alpha: 0.005,
+            size_us: 3.0,
+            rivals: vec![rival("face-drag", false, 10.1), rival("battery", false, 9.0)],
+            shape: None,
+            in_field: None,
+        };
+        assert_eq!(gain_nats(&step, &step.rivals[0]), 36.8);
+        assert_eq!(gain_nats(&step, &step.rivals[1]), 9.0);
+        let figure = figure(&step, 1, Format::default()).unwrap();
+        assert!(figure.svg.contains("36.8") && !figure.svg.contains("10.1"));
+        assert!(figure.caption.contains("beside the rest of what was found"));
+    }
 
     #[test]
     fn ticks_are_round_and_rise() {
