@@ -100,16 +100,13 @@ const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 /// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
 /// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag explains
 /// enough to be named and moves the pulse by too little; and a shape of the climb that could
-/// not be taken in may be an effect in another updraft. Where leans told a drag of the rotors (`by_leans`), momentum drag
-/// leans a drone as the one that was taken does, and drags along the rotors' axis besides: what another updraft then does to
-/// the pulse, wind and form make up for. `flown` searches with these options, and `rest` looks for what is left.
+/// not be taken in may be an effect in another updraft. `flown` searches with these options, and `rest` looks for what is left.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
 pub(super) fn effect_after_all(
     found: Found,
     options: &Options,
-    by_leans: bool,
     flown: impl Fn(&Options) -> Result<Searched, GapError> + Sync,
     rest: impl FnOnce(&Options, Left) -> Result<Found, GapError>,
 ) -> Result<Found, GapError> {
@@ -120,26 +117,20 @@ pub(super) fn effect_after_all(
     let is_misread =
         wind.measured.is_none() && (is_strong_wind(wind.mean_mps) || passes && reads_wind);
     let is_left = passes && Dependence::of(&end.candidate) == Some(Dependence::Climb);
-    if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left || by_leans) {
+    if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
         return Ok(found);
     }
     let drags = WIND_READERS.iter().filter(|_| is_misread).filter_map(|role| role.place());
     let mut effects: Vec<&'static str> = drags.map(|place| place.name()).collect();
     add_new(&mut effects, shapes().filter(|name| is_left && depends_on_climb(name)));
-    let in_its_place = Role::MomentumDrag.place().map(|place| place.name()).filter(|_| by_leans);
-    add_new(&mut effects, in_its_place);
     let bins = comparison.data.bins_of_groups();
     let price_nats = if is_left { FREE_FLOOR_NATS } else { FLOOR_NATS };
-    let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
+    let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + price_nats);
     let ended = |effect: &&'static str| {
-        // What takes the place of a drag that leans told is one effect for one.
-        let is_in_its_place = in_its_place == Some(*effect);
-        let beaten_nats = nats + if is_in_its_place { 0.0 } else { price_nats };
         let only = Only { effect, updraft_mps, beaten_nats };
-        let ended = Ended::of(&alone(options, only), &bins, &flown);
-        ended.filter(|it| it.nats > beaten_nats)
+        Ended::of(&alone(options, only), &bins, &flown)
     };
-    let better = effects.par_iter().filter_map(ended);
+    let better = effects.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
     let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
     match best {
         Some(Ended { only: Some(only), left: Some(left), .. }) => {
@@ -520,7 +511,7 @@ mod tests {
                 Ok(Searched { found: there, left: None })
             };
             let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
-            let there = effect_after_all(nothing, options, false, flown, none_left).unwrap();
+            let there = effect_after_all(nothing, options, flown, none_left).unwrap();
             !there.steps.is_empty()
         };
         let options = Options::default();
@@ -539,28 +530,6 @@ mod tests {
     }
 
     #[test]
-    fn momentum_drag_has_its_turn_where_leans_told_a_drag_of_the_rotors() {
-        let data = trial::data(2, |_, _| 0.0);
-        let found = |updraft_mps: f64, by_leans: bool| {
-            let mut nothing = Found::nothing(trial::comparison(&data));
-            nothing.updraft_mps = updraft_mps;
-            let flown = |options: &Options| {
-                let mut there = Found::nothing(trial::comparison(&data));
-                there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
-                Ok(Searched { found: there, left: None })
-            };
-            let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
-            let options = Options::default();
-            let there = effect_after_all(nothing, &options, by_leans, flown, none_left).unwrap();
-            leads(&there).concat()
-        };
-        // One for one: it pays what it costs, and no more.
-        assert_eq!(found(13.0, true), "momentum-drag");
-        assert_eq!(found(11.0, true), "", "the drag that was taken explains nearly as much");
-        assert_eq!(found(20.0, false), "");
-    }
-
-    #[test]
     fn a_shape_of_the_climb_that_was_not_taken_in_may_be_an_effect() {
         let data = trial::data(2, |_, _| 0.0);
         let tried = |candidate: &str, gain_nats: f64| {
@@ -573,8 +542,7 @@ mod tests {
                 Ok(Searched { found: Found::nothing(trial::comparison(&data)), left: None })
             };
             let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
-            let there =
-                effect_after_all(nothing, &Options::default(), false, flown, none_left).unwrap();
+            let there = effect_after_all(nothing, &Options::default(), flown, none_left).unwrap();
             assert!(there.steps.is_empty(), "none of them was found");
             asked.into_inner().unwrap()
         };

@@ -74,26 +74,20 @@ impl Question<'_> {
             }
         }
         let setting = self.setting(train);
-        let by_leans = lacked_drag([self.original, self.repaired]);
         if found.steps.is_empty() {
             let flown = |options: &Options| setting.search(options);
             let rest = |options: &Options, left| setting.look_for_rest(options, left);
-            found = effect_after_all(found, self.options, by_leans, flown, rest)?;
+            found = effect_after_all(found, self.options, flown, rest)?;
             if !found.steps.is_empty() {
                 gap = self.case(&found).gap(train, held)?;
             }
         }
         let before = found.steps.clone();
         if !found.steps.is_empty() {
+            let by_leans = lacked_drag([self.original, self.repaired]);
             found = fewer_instead(found, self.options, by_leans, setting)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;
-            }
-        }
-        if is_by_chance(&found.steps, &gap) {
-            let nothing = Options { most_steps: 0, ..*self.options };
-            if let Some(as_it_is) = if_flown(self.searched(train, held, nothing))? {
-                (found, gap) = as_it_is;
             }
         }
         if !grows(&gap) {
@@ -164,25 +158,6 @@ pub(super) fn grows(gap: &Gap) -> bool {
     })
 }
 
-/// A free shape that explains less than this many times its threshold may be chance. Chosen after one flight with nothing
-/// hidden, whose shape gained 14.5 nats of 14; how often it drops what is there was not measured.
-const PLAIN: f64 = 1.5;
-/// What is there moves the pulse of drones that were not fitted as well; a shape that takes away less than this share of its
-/// own size from them, in squares, is not there. Chosen: a quarter of what is expected.
-const SHOWN: f64 = 0.25;
-
-/// Whether all that was found are free shapes, hardly above their threshold, of which drones that were not fitted show nothing.
-fn is_by_chance(steps: &[Step], gap: &Gap) -> bool {
-    let is_faint = |step: &Step| {
-        matches!(step.finding, Finding::Unknown { .. })
-            && step.gain_nats < PLAIN * step.threshold_nats
-    };
-    let Some(drones) = gap.drones else { return false };
-    let size2: f64 = steps.iter().map(|step| step.size_us.powi(2)).sum();
-    let gone = drones.before_without_air_us.powi(2) - drones.after_without_air_us.powi(2);
-    !steps.is_empty() && steps.iter().all(is_faint) && gone < SHOWN * size2
-}
-
 /// A finding that cannot be taken in: its effects with the rival that explains most, by its own search or by those of
 /// `others` if nothing was searched for beside it. `None`: an effect without a rival, of which nothing can be said.
 fn withdrawn(mut step: Step, others: &[Step]) -> Option<Step> {
@@ -234,30 +209,6 @@ mod tests {
         let unknown = Finding::Unknown { depends_on: Dependence::Climb, formula: None };
         let kept = alone(step(unknown.clone(), &["one"])).unwrap();
         assert_eq!(kept.finding, unknown);
-    }
-
-    #[test]
-    fn a_faint_shape_that_held_out_drones_do_not_show_is_chance() {
-        let unknown = |gain_nats: f64, size_us: f64| {
-            let finding = Finding::Unknown { depends_on: Dependence::ClimbTime, formula: None };
-            Step { gain_nats, threshold_nats: 14.0, size_us, ..step(finding, &[]) }
-        };
-        let gap = |before_without_air_us: f64, after_without_air_us: f64| Gap {
-            drones: Some(Shrink {
-                before_without_air_us,
-                after_without_air_us,
-                ..Shrink::default()
-            }),
-            rungs: None,
-        };
-        let nothing_gone = gap(4.60, 4.61);
-        assert!(is_by_chance(&[unknown(14.5, 2.6)], &nothing_gone));
-        assert!(!is_by_chance(&[unknown(14.5, 2.6)], &gap(4.6, 4.0)), "they show it");
-        assert!(!is_by_chance(&[unknown(28.0, 2.6)], &nothing_gone), "plain");
-        assert!(!is_by_chance(&[], &nothing_gone));
-        assert!(!is_by_chance(&[unknown(14.5, 2.6)], &Gap::default()), "nobody was held out");
-        let named = step(name("one"), &[]);
-        assert!(!is_by_chance(&[named, unknown(14.5, 2.6)], &nothing_gone));
     }
 
     #[test]

@@ -23,9 +23,6 @@ const FORM: f64 = 0.001;
 /// Standard errors from which a difference is named: those of [`super::detectable`], at which an effect is
 /// found nearly always. Chosen.
 const NAMED_Z: f64 = 5.0;
-/// Standard errors from which leans point to a drag of the rotors that the pulse must tell. Chosen after one flight with a
-/// drag of four standard errors; how often flights without any have so much was not measured.
-const HINTED_Z: f64 = 2.5;
 
 /// Air speed of a leg, m/s: those of the templates.
 const LEG_MPS: f64 = 3.0;
@@ -83,22 +80,13 @@ pub(super) fn alike() -> Vec<String> {
 
 /// Drag that the model lacks, or has with another size: a class, because leans do not tell its kind.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
-    told(before, wind, alpha, NAMED_Z)
-}
-
-/// As [`step`], where the leans alone do not tell it: for a pulse that depends on the wind in a way that nothing explains.
-pub(super) fn hint(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
-    told(before, wind, alpha, HINTED_Z)
-}
-
-fn told(before: &Comparison, wind: &WindFound, alpha: f64, least_z: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     // Whose drag it is the speeds tell: that of rotors is linear, that of a body goes with the square.
     let body = before.body_told();
     let nats = body.map_or(f64::NEG_INFINITY, |(body, _)| body.better_nats);
     let apart = apart(measured.law, wind.model_lean_per_mps);
     let of_rotors = apart.abs() / measured.linear_se.hypot(FORM);
-    let (z, effects, parameters) = if apart.abs() >= MATERIAL && of_rotors >= least_z {
+    let (z, effects, parameters) = if apart.abs() >= MATERIAL && of_rotors >= NAMED_Z {
         let parameters = match body {
             Some(told) if nats > CLASS_NATS => of_body(told, &before.vehicle)?,
             _ => {
@@ -261,16 +249,10 @@ mod tests {
         assert_eq!(told(0.02, 1e-2), None, "it may be none");
         assert_eq!(told(0.0049, 1e-4), None, "the form of the drag may be another");
         assert!(told(0.0052, 1e-4).is_some());
-        assert_eq!(told(0.02, 5e-3), None, "four standard errors are a hint");
+        assert_eq!(told(0.02, 5e-3), None, "four standard errors are too few");
         assert_eq!(told(0.002, 1e-4), None, "nobody would notice");
         assert_eq!(told(0.02, f64::INFINITY), None);
         assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
-        let mut hinted = |linear_se: f64| {
-            let law = LeanLaw { linear: model.linear + 0.02, ..model };
-            comparison.wind.measured = Some(Measured { law, linear_se, misfit_nats: 0.0 });
-            hint(&comparison, &found(&comparison), 0.005).is_some()
-        };
-        assert!(hinted(5e-3) && !hinted(1e-2));
     }
 
     #[test]

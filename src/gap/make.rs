@@ -19,7 +19,6 @@ use super::noise::{
 use super::other_plan::without_strangers;
 use super::refine::Parameter;
 use super::regimes::regimes;
-use super::search::FLOOR_NATS;
 use super::sensor::sensor;
 use super::stand_in::{as_in_file, read_from_logs, stand_in};
 use super::verdict::{
@@ -116,7 +115,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
     let before = Comparison::new(&data, vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
-    let mut leans = super::lean_channel::step(&before, &wind, options.alpha);
+    let leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(vehicle, &channel);
     if channel.named {
         // What is late may be the log alone: then the model must not be made late. So it is where no drone could have flown
@@ -130,7 +129,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
             repaired = vehicle.clone();
         }
     }
-    let answered = |repaired: &Vehicle, leans: &Option<Step>| {
+    let answered = |repaired: &Vehicle| {
         let mut repaired = repaired.clone();
         add_others(&mut repaired, leans.as_slice());
         add_bodies(&mut repaired, leans.as_slice());
@@ -144,36 +143,16 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         };
         question.answered(&train, &held)
     };
-    let (mut found, mut shrink) = match answered(&repaired, &leans) {
+    let (mut found, mut shrink) = match answered(&repaired) {
         Err(error) if error.is_not_flown() && channel.named && !channel.in_log => {
             channel.in_log = true;
-            answered(vehicle, &leans)?
+            answered(vehicle)?
         }
         answered => answered?,
     };
     if is_only_in_log(&channel, &shrink) {
         channel.in_log = true;
-        (found, shrink) = answered(vehicle, &leans)?;
-    }
-    // Leans may point to a drag that they do not tell alone: what the pulse has left of the wind can be that drag's.
-    if leans.is_none()
-        && found.steps.iter().any(is_of_wind)
-        && let Some(hint) = super::lean_channel::hint(&before, &wind, options.alpha)
-    {
-        let repaired = if channel.named && !channel.in_log { &repaired } else { vehicle };
-        let hinted = Some(hint);
-        match answered(repaired, &hinted) {
-            Err(error) if !error.is_not_flown() => return Err(error),
-            Err(_) => {}
-            Ok((there, gap)) => {
-                let more_nats = there.explains()? - found.explains()?;
-                if more_nats > FLOOR_NATS && !grows(&gap) && !there.steps.iter().any(is_of_wind) {
-                    (found, shrink) = (there, gap);
-                    leans =
-                        hinted.map(|hint| Step { gain_nats: hint.gain_nats + more_nats, ..hint });
-                }
-            }
-        }
+        (found, shrink) = answered(vehicle)?;
     }
     if shrink.left_over().is_some() {
         super::single::beside_what_nothing_explains(&mut found.steps);
@@ -337,12 +316,6 @@ fn model(vehicle: &Vehicle, found: &Found, steps: &[Step]) -> Vehicle {
         add_bodies(&mut model, steps);
     }
     model
-}
-
-/// Whether it is something unknown of the wind, or of how drones lean in it.
-fn is_of_wind(step: &Step) -> bool {
-    let Finding::Unknown { depends_on, .. } = &step.finding else { return false };
-    matches!(depends_on, Dependence::Wind | Dependence::Lean)
 }
 
 /// Whether an error of the velocity that was taken into the model's loop is the log's alone after all. Which of the two it
