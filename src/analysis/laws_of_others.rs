@@ -19,23 +19,25 @@ const CHANCE: f64 = 0.003;
 /// Share of the levels' differences that is found again in what is measured: all of it with others' laws; with their own
 /// no more than what the levels themselves are off by.
 const SHARE: f64 = 0.5;
+/// Levels must differ by so many times their standard errors. What they are off by is in all that their own laws measure, and of drones
+/// that are alike nothing else is in the levels. Chosen: a quarter of their variance is then error.
+const BEYOND_ERRORS: f64 = 2.0;
 
 /// That the laws of a calibration seem to be those of other drones than the map's.
 pub(super) fn doubt(map: &UpdraftMap, calibration: &FlightAnalysis) -> Option<Warning> {
     let slope = calibration.flock.as_ref()?.linear.as_ref()?.parameters.first()?.estimate.value;
-    let pairs: Vec<(f64, f64)> = map
+    let (pairs, errors): (Vec<(f64, f64)>, Vec<f64>) = map
         .drones
         .iter()
         .filter(|drone| drone.mapping == LawOf::Own)
         .filter_map(|drone| {
             let calibrated = same_drone(calibration, drone.slot, &drone.name)?;
-            let level =
-                calibrated.laws.as_ref()?.linear.as_ref()?.parameters.get(1)?.estimate.value;
-            Some((level / slope, drone.mean.value))
+            let level = calibrated.laws.as_ref()?.linear.as_ref()?.parameters.get(1)?.estimate;
+            Some(((level.value / slope, drone.mean.value), level.se / slope))
         })
-        .filter(|(level_mps, mean_mps)| level_mps.is_finite() && mean_mps.is_finite())
-        .collect();
-    depends(&pairs).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
+        .filter(|((level_mps, mean_mps), _)| level_mps.is_finite() && mean_mps.is_finite())
+        .unzip();
+    depends(&pairs, &errors).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
         drones: pairs.len(),
         correlation,
         spread_mps,
@@ -43,8 +45,8 @@ pub(super) fn doubt(map: &UpdraftMap, calibration: &FlightAnalysis) -> Option<Wa
 }
 
 /// Correlation of the levels with the means that were measured, both in m/s, and the standard deviation of the levels;
-/// `None` as long as they may be independent.
-fn depends(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
+/// `None` as long as they may be independent, or the levels' errors (m/s) be all that they differ by.
+fn depends(pairs: &[(f64, f64)], errors: &[f64]) -> Option<(f64, f64)> {
     if pairs.len() < FEWEST {
         return None;
     }
@@ -55,7 +57,9 @@ fn depends(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let chance = StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
     let centre_mps = line.mean[0];
     let spread_mps = rms(pairs.iter().map(|pair| pair.0 - centre_mps))?;
-    (chance < CHANCE && line.slope() > SHARE).then_some((correlation, spread_mps))
+    let error_mps = rms(errors.iter().copied().filter(|se| se.is_finite())).unwrap_or(0.0);
+    let is_beyond = spread_mps > BEYOND_ERRORS * error_mps;
+    (is_beyond && chance < CHANCE && line.slope() > SHARE).then_some((correlation, spread_mps))
 }
 
 #[cfg(test)]
@@ -80,7 +84,7 @@ mod tests {
                     (level, draw(air_mps) + off)
                 })
                 .collect();
-            depends(&pairs).is_some()
+            depends(&pairs, &vec![0.03; drones]).is_some()
         });
         found.count() as f64 / f64::from(fleets)
     }
@@ -96,5 +100,14 @@ mod tests {
         // Few drones are doubted where the chance is small, and none where it is not.
         assert!(doubted(9, 0.2, false) > 0.2);
         assert!(doubted(5, 0.2, false) == 0.0);
+    }
+
+    #[test]
+    fn levels_that_differ_by_their_errors_alone_doubt_nobody() {
+        // Of drones that are alike: what a level is off by is in all that is measured by it.
+        let pairs: Vec<(f64, f64)> =
+            (0..16).map(|at| 0.01 * f64::from(at)).map(|level| (level, level)).collect();
+        assert!(depends(&pairs, &[0.08; 16]).is_none());
+        assert!(depends(&pairs, &[0.01; 16]).is_some());
     }
 }

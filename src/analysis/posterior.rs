@@ -17,6 +17,10 @@ use crate::numeric::mean;
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
 
+/// Why still air has no scales.
+const NO_MOTION: &str =
+    "what the drones show varies by no more than their errors do, so no air that moves is told";
+
 /// One drone's values at the map's times, as the model sees them.
 pub(super) fn seen(
     series: &DroneSeries,
@@ -105,7 +109,13 @@ pub(super) fn add(
     };
     let first_s = map.time_s.first().copied().unwrap_or_default();
     map.thermals = found.thermals.iter().map(|one| Thermal::new(one, first_s)).collect();
-    let adequate = found.adequacy.is_adequate;
+    let no_scales = if !found.adequacy.is_adequate {
+        Some(found.adequacy.sentence())
+    } else if !found.moves {
+        Some(NO_MOTION.to_owned())
+    } else {
+        None
+    };
     map.posterior = Some(PosteriorMap {
         grid: found.grid.map(|grid| PosteriorGrid {
             time_s: grid
@@ -121,7 +131,7 @@ pub(super) fn add(
         }),
         fleet: found.fleet_mps.map(|(mean, se)| Estimate::new(mean, se)),
         filled,
-        scales: adequate.then(|| AirScales {
+        scales: no_scales.is_none().then(|| AirScales {
             form: found.air.form.words().to_owned(),
             sd_mps: found.air.sd_mps,
             length_m: scale(found.length_m),
@@ -131,7 +141,7 @@ pub(super) fn add(
             gust_s: found.air.gust_s,
             slow_mps: found.air.slow_mps,
         }),
-        no_scales: (!adequate).then(|| found.adequacy.sentence()),
+        no_scales,
         zero_shift_mps: found.zero_shift_mps,
         uniform_probability: found.uniform_probability,
         truth: truth::check_posterior(&map.drones).map(|check| {

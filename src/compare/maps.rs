@@ -295,6 +295,9 @@ fn independent(places: &[PlaceChange], lengths_m: [f64; 2]) -> Option<f64> {
     (both > 0.0).then(|| 1.0 + a.trace() * b.trace() / both)
 }
 
+/// Rows of the air at a drone, which the posterior has nothing of.
+const OF_DRONES: usize = 2;
+
 /// Strength and scales that both flights have.
 fn scales(flights: [&FlightAnalysis; 2], maps: [&UpdraftMap; 2]) -> Vec<ScaleComparison> {
     type Of = fn(&FieldStatistics) -> Option<(f64, Option<[f64; 2]>)>;
@@ -321,14 +324,18 @@ fn scales(flights: [&FlightAnalysis; 2], maps: [&UpdraftMap; 2]) -> Vec<ScaleCom
         }),
     ];
     let statistics = flights.map(|flight| flight.statistics.as_ref());
+    let posterior =
+        maps.map(|map| map.posterior.as_ref().and_then(|posterior| posterior.scales.as_ref()));
+    // The others are of one exponential field, and of what one flight happens to show of it: their intervals do not hold in air
+    // that has gusts besides, and told flights in the same air apart.
+    let told = if posterior.iter().all(Option::is_some) { OF_DRONES } else { of_statistics.len() };
     let mut rows: Vec<ScaleComparison> = of_statistics
         .into_iter()
+        .take(told)
         .filter_map(|(name, unit, of)| {
             Some(row(name, unit, of(statistics[0]?)?, of(statistics[1]?)?))
         })
         .collect();
-    let posterior =
-        maps.map(|map| map.posterior.as_ref().and_then(|posterior| posterior.scales.as_ref()));
     if let [Some(a), Some(b)] = posterior {
         for (name, unit, of) in [
             ("correlation length of the posterior map", "m", [a.length_m, b.length_m]),

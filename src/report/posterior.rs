@@ -31,8 +31,24 @@ pub(super) fn interval(of: Estimate) -> String {
     format!("95 %: {} to {} m/s", at(-NORMAL), at(NORMAL))
 }
 
-/// Why there is none.
-const NO_POSTERIOR: &str = "No posterior map: it takes three drones that hover, and 24 values in all that share no second.";
+/// Why there is none of few values.
+const TOO_FEW: &str = "No posterior map: it takes three drones that hover, and 24 values in all that share no second.";
+/// Why there is none otherwise.
+const NOTHING_FITS: &str = "No posterior map: no air that the model knows fits these values with what their calibration says of the zero.";
+/// Drones that a posterior of a hover takes, and seconds of values in all, of which one in ten shares none with the next.
+const FEWEST: (usize, usize) = (3, 240);
+
+/// Why a map has no posterior.
+fn no_posterior(map: &UpdraftMap) -> &'static str {
+    let seconds = map.drones.iter().map(|drone| drone.updraft_mps.iter().flatten().count());
+    let with_values: Vec<usize> = seconds.filter(|seconds| *seconds > 0).collect();
+    let enough_drones = map.is_scan() || with_values.len() >= FEWEST.0;
+    if enough_drones && with_values.iter().sum::<usize>() >= FEWEST.1 {
+        NOTHING_FITS
+    } else {
+        TOO_FEW
+    }
+}
 
 /// The posterior in a headline; `None` without one.
 pub(super) fn headline(map: &UpdraftMap) -> Option<String> {
@@ -50,7 +66,7 @@ pub(super) fn headline(map: &UpdraftMap) -> Option<String> {
 pub(super) fn sentences(map: &UpdraftMap) -> Vec<String> {
     let Some(posterior) = map.posterior.as_ref() else {
         let is_plain = map.common.is_none();
-        return if is_plain { Vec::new() } else { vec![NO_POSTERIOR.to_owned()] };
+        return if is_plain { Vec::new() } else { vec![no_posterior(map).to_owned()] };
     };
     let mut sentences = Vec::new();
     if let Some(fleet) = fleet(map) {

@@ -26,7 +26,7 @@ impl Adequacy {
     pub(in super::super) fn sentence(&self) -> String {
         format!(
             "no stationary field describes this air (what neighbours do not tell has a kurtosis of {:.1} instead of 3, and is up \
-             to {:.1} times as strong at one drone as on average): a passing thermal has no correlation length",
+             to {:.1} times as strong at one drone as on average), so it has no one correlation length",
             3.0 + self.kurtosis,
             self.strongest
         )

@@ -51,6 +51,11 @@ const GRADIENT_MPS_PER_M: f64 = 0.005;
 /// Drones' means that lie apart by so many times what their constants explain are asked of air that lasts. Chosen: a fleet of nine
 /// has it by chance less than once in a hundred.
 const LASTING: f64 = 1.75;
+/// What a field that moves must explain values by, nats: it has a strength, a length and a time (5 % of a chi-square of three
+/// degrees of freedom).
+const MOVES_NATS: f64 = 4.0;
+/// A field that is none, m/s.
+const NO_FIELD_MPS: f64 = 1e-4;
 
 /// A flight's values with its calibration.
 pub(in super::super) struct Input<'a> {
@@ -87,6 +92,8 @@ pub(in super::super) struct Posterior {
     pub(in super::super) length_m: Scale,
     pub(in super::super) time_s: Scale,
     pub(in super::super) adequacy: Adequacy,
+    /// Whether the values show air that moves at all: what they scatter by may be their errors, and then there are no scales.
+    pub(in super::super) moves: bool,
     /// What is added to all values, m/s: how far the zero moved.
     pub(in super::super) zero_shift_mps: f64,
     /// Probability of an updraft that is everywhere the same.
@@ -261,6 +268,7 @@ fn mapped(
         length_m,
         time_s,
         adequacy: adequate(&model, &values.rows, &values.neighbours),
+        moves: moves(&Search { whole: Some(&values.fine), ..search }, air),
         zero_shift_mps: shift(&model, &values.rows),
         uniform_probability,
         thermals,
@@ -403,6 +411,19 @@ fn averaged(sampled: &[(&Found, Sampled<Vec<Choice>>)], index: usize) -> Scale {
     let or = |own: f64, other: f64| if own > 0.0 { own } else { other };
     let interval = [mean - NORMAL * or(below, above), mean + NORMAL * or(above, below)];
     Scale { value: mean.exp(), interval: interval.map(f64::exp) }
+}
+
+/// Whether air with a field explains the values better than air without.
+fn moves(search: &Search<'_>, air: Air) -> bool {
+    let log_likelihood = |air: Air| {
+        let covariance = Covariance::new(air).shown(search.slope_share);
+        let system = search.system_in(&covariance)?;
+        let solved = system.posterior(&CommonVector::zeros(), &search.factor)?;
+        Some(solved.log_likelihood)
+    };
+    let still = Air { sd_mps: NO_FIELD_MPS, slow_mps: NO_FIELD_MPS, ..air };
+    let gain = log_likelihood(air).zip(log_likelihood(still)).map(|(with, without)| with - without);
+    gain.is_none_or(|nats| nats > MOVES_NATS)
 }
 
 fn adequate(model: &Model<'_>, rows: &Rows, neighbours: &Neighbours) -> Adequacy {

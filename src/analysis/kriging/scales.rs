@@ -24,7 +24,7 @@ pub(super) const DRIFT: usize = 5;
 pub(super) const LN_GUST: usize = 6;
 const LN_GUST_TIME: usize = 7;
 /// Of slow air besides.
-const LN_SLOW: usize = 8;
+pub(super) const LN_SLOW: usize = 8;
 /// Of the error that all drones share, as a share of the wind.
 const LN_SHARED: usize = 9;
 

@@ -367,6 +367,22 @@ fn a_stationary_field_has_no_thermal() {
 }
 
 #[test]
+fn gusts_that_the_wind_carries_through_a_field_are_no_thermals() {
+    let stays = air(Form::Exponential, 0.5, 145.0, 186.0);
+    let carried = Air { drift_mps: [2.0, 0.0], ..air(Form::Exponential, 0.3, 19.0, 1e4) };
+    for seed in 0..2 {
+        let (drones, mut rows) = made(seed, HOVER, stays, None);
+        let (_, gusts) = made(seed + 100, HOVER, carried, None);
+        rows.list
+            .iter_mut()
+            .zip(&gusts.list)
+            .for_each(|(row, gust)| row.value_mps += gust.value_mps);
+        let found = looked_for(&drones, &rows, Some([2.0, 0.0]));
+        assert!(found.is_empty(), "{seed}: {found:?}");
+    }
+}
+
+#[test]
 fn a_small_fleet_takes_no_slope_of_a_field_for_a_thermal() {
     for seed in 0..4 {
         let (drones, rows) = made(seed, SMALL, air(Form::Exponential, 0.5, 145.0, 186.0), None);
