@@ -10,7 +10,7 @@ use super::aware::{ASKED_FOR, Aware, TYPICAL_SLOPE};
 use super::beside::Beside;
 use super::calibrate::{self, FitOptions};
 use super::cause::Cause;
-use super::caution::{fit_cautions, tilt_caution, wind_caution};
+use super::caution::{fit_cautions, response_caution, steep_caution, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{One, Shared, one};
@@ -358,6 +358,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
     });
     let Sorted { mut drones, measured, seen, unmeasured } =
         sorted(shared, purpose, ones, &mut warnings);
+    warnings.extend(steep_caution(&mut drones));
     let laws = match purpose {
         Purpose::Calibration => fleet_laws(shared, &mut drones, &mut warnings),
         Purpose::Measurement => FleetLaws::default(),
@@ -558,7 +559,8 @@ fn mark_partial(drones: &mut [DroneAnalysis], options: &FitOptions) -> Vec<Warni
 
 /// What a reader of a map must know.
 fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
-    let mut warnings: Vec<Warning> = wind_caution(map).into_iter().collect();
+    let response = response_caution(map, shared.options.indicator);
+    let mut warnings: Vec<Warning> = response.into_iter().chain(wind_caution(map)).collect();
     let calibration = shared.reference.filter(|_| shared.aware.is_some());
     let battery = calibration.filter(|_| shared.input.sag.is_some());
     warnings.extend(battery.and_then(|found| battery_caution(map, found)));

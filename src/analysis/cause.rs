@@ -89,6 +89,15 @@ pub enum Cause {
         /// Start and end of the plan's windows, show time, s.
         plan_s: [f64; 2],
     },
+    /// The log ends after the show's start, and before the plan's first window.
+    EndsBefore {
+        /// End of the log, show time, s.
+        end_s: f64,
+        /// Start of the plan's first window, show time, s.
+        first_s: f64,
+        /// Height above the ground at which the log ends, m; `None`: the drone had landed.
+        height_m: Option<f64>,
+    },
     /// The drone's show began at another time than those of most drones.
     OtherStart {
         /// Delay behind the start of most drones, s.
@@ -207,11 +216,14 @@ impl Cause {
                 self.other_plan()
             }
             Self::OtherTime { log_s: [from, to], plan_s: [first, last] } => format!(
-                "its log runs from {from:.0} to {to:.0} s of show time, and the plan's windows lie \
+                "the log runs from {from:.0} to {to:.0} s of show time, and the plan's windows lie \
                  between {first:.0} and {last:.0} s: the drone's clock jumped or was set wrong, or the \
                  log is of another start; nothing of the plan is in it"
             )
             .into(),
+            Self::EndsBefore { end_s, first_s, height_m } => {
+                ends_before(*end_s, *first_s, *height_m)
+            }
             Self::OtherStart { later_s } => format!(
                 "its show began {} than that of most drones (by its log's GPS time): it flew the plan \
                  at another time, in other air, and has no place in this map. Analyse its log by itself \
@@ -356,6 +368,19 @@ fn other_place(slot: u16, distance_m: f64, limit_m: f64) -> Sentence {
             " m is taken for GPS error); take the log away, or plan with the origin and orientation \
              that were flown",
         )
+}
+
+fn ends_before(end_s: f64, first_s: f64, height_m: Option<f64>) -> Sentence {
+    let sentence = match height_m {
+        Some(height_m) => Sentence::from("the log ends in the air, ")
+            .number(height_m, &format!("{height_m:.1}"))
+            .words(" m above the ground, "),
+        None => Sentence::from("the flight ends "),
+    };
+    sentence.number(end_s, &format!("{end_s:.1}")).words(&format!(
+        " s after the show's start, before the plan's first window (from {first_s:.0} s): there is \
+         nothing to measure in it"
+    ))
 }
 
 fn logs_not_used(logs: &[(String, Cause)]) -> Sentence {

@@ -8,12 +8,20 @@ use super::stats::mean_sd;
 use super::warning::{Warning, WindHandled};
 use super::wind::{Leaning, axial_of};
 use crate::base::estimate::Estimate;
+use crate::flight::{Flight, Indicator, Series};
 
 /// A systematic error above this is worth a sentence, m/s. Chosen.
 const WORTH_SAYING_MPS: f64 = 0.05;
 
 /// A change of u0 below this reads as zero, us (or the indicator's unit).
 const WORTH_SAYING_US: f64 = 0.05;
+
+/// Roll and pitch beyond this are steep, degrees: no drone that measures flies so for long. Chosen.
+pub(super) const STEEP_DEG: f64 = 45.0;
+
+/// Angles are doubted where more than this share of them is steep: degrees that are taken for radians are steep from
+/// 0.8 degrees on. Chosen.
+const STEEP_SHARE: f64 = 0.1;
 
 /// A law from fewer windows is warned about: two more than a line has parameters.
 const FEWEST_WINDOWS: usize = 4;
@@ -51,6 +59,39 @@ fn lean_caution(drones: &[DroneAnalysis], leaning: Option<Leaning>) -> Option<Wa
     let axial_mps = axial_of(leaning, lean_deg);
     let known = leaning.is_some();
     (axial_mps > WORTH_SAYING_MPS).then_some(Warning::LadderWind { lean_deg, axial_mps, known })
+}
+
+/// About the angles of a table, whose unit its mapping says: they are steeper than a drone's.
+pub(super) fn steep(flight: &Flight, name: &str) -> Option<Warning> {
+    let share = |angles: &Series| {
+        let steep = angles.value.iter().filter(|angle| angle.abs() > STEEP_DEG.to_radians());
+        steep.count() as f64 / angles.len().max(1) as f64
+    };
+    let share = share(&flight.roll_rad).max(share(&flight.pitch_rad));
+    (share > STEEP_SHARE).then(|| Warning::Steep { drones: vec![name.to_owned()], share })
+}
+
+/// Takes what is said of the drones' angles from them: it is one caution of their flight.
+pub(super) fn steep_caution(drones: &mut [DroneAnalysis]) -> Option<Warning> {
+    let (mut names, mut most) = (Vec::new(), 0.0_f64);
+    for drone in drones {
+        drone.warnings.retain(|warning| {
+            let Warning::Steep { drones, share } = warning else { return true };
+            names.extend_from_slice(drones);
+            most = most.max(*share);
+            false
+        });
+    }
+    (!names.is_empty()).then_some(Warning::Steep { drones: names, share: most })
+}
+
+/// About a vehicle whose response is not that of the calibration's legs.
+pub(super) fn response_caution(map: &UpdraftMap, indicator: Indicator) -> Option<Warning> {
+    let levels = map.levelled.iter().flat_map(|levelled| &levelled.drones);
+    let drones: Vec<(String, [f64; 2])> = levels
+        .filter_map(|drone| Some((drone.name.clone(), [drone.slope, drone.legs_slope?])))
+        .collect();
+    (!drones.is_empty()).then_some(Warning::OtherResponse { drones, indicator })
 }
 
 /// About the two forms of the tilt correction, where they differ by more than the fleet's u0 is known.
@@ -94,4 +135,27 @@ pub(super) fn wind_caution(map: &UpdraftMap) -> Option<Warning> {
     };
     let lean_deg = mean_sd(&tilts).0;
     Some(Warning::Wind { lean_deg, error_mps: error, corrected, moved: map.is_scan() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degrees_that_are_taken_for_radians_are_no_angles_of_a_drone() {
+        let flight = |angles: &[f64]| {
+            let time_s = (0..angles.len()).map(|index| index as f64).collect();
+            let roll_rad = Series { time_s, value: angles.to_vec() };
+            Flight { pitch_rad: roll_rad.clone(), roll_rad, ..Flight::default() }
+        };
+        let radians = [0.05, -0.02, 0.03, 0.04, -0.3, 0.5, 0.02, 0.01, 0.0, 0.9];
+        assert!(steep(&flight(&radians), "a").is_none(), "one in ten is a turn");
+        assert!(steep(&Flight::default(), "a").is_none());
+        let degrees = radians.map(f64::to_degrees);
+        let said = steep(&flight(&degrees), "a").unwrap().to_string();
+        assert!(
+            said.starts_with("angles: roll or pitch of a is beyond 45 degrees in 90 % of the rows"),
+            "{said}"
+        );
+    }
 }

@@ -5,6 +5,7 @@ use super::beside::Beside;
 use super::budget::QualityFlag;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::cause::Cause;
+use super::caution::steep;
 use super::corrections::Corrections;
 use super::held_hover;
 use super::hover::Hover;
@@ -111,8 +112,9 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         Some(mapping) if flight.desired_up_mps.is_none() => steady(flight, &mapping.steps),
         _ => find_targets(flight, slot.map(|(_, segments)| segments), &mut warnings)?,
     };
-    let elsewhere = elsewhere(flight, &targets);
-    warnings.extend(elsewhere.clone().map(Warning::NothingOfPlan));
+    if let Some(cause) = elsewhere(flight, &targets) {
+        return Err(cause);
+    }
     let corrected = windows::correct_tilt(flight, &options.windows);
     let mut stats = windows::measure(flight, &corrected, &targets, &options.windows);
     let offset = options
@@ -125,6 +127,9 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         Some((slot, _)) => slot.name.clone(),
         None => plain(&log.path.file_stem().unwrap_or_default().to_string_lossy()).into_owned(),
     };
+    if log.table.is_some() {
+        warnings.extend(steep(flight, &name));
+    }
     let number = slot.map(|(slot, _)| slot.slot);
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
@@ -140,13 +145,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let left = held_hover::end_where_left(flight, &mut of_air);
     let seen = Seen { flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
-    let mut updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
-        (None, None, _) => None,
-        (_, _, Some(reason)) => Some(Err(reason.clone())),
-        (Some(level), ..) => {
+    let mut updraft = match (input.level.filter(|_| measures), shared.map_reference) {
+        (None, None) => None,
+        (Some(level), _) => {
             Some(levelled::measure(shared, level, flight, &of_air, (number, &name)))
         }
-        (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
+        (None, Some(reference)) => Some(measure(shared, &seen, reference, number, &name)),
     };
     if let Some(Ok((series, _))) = &mut updraft
         && let Some(measured) = &mut series.measured
@@ -193,7 +197,14 @@ fn elsewhere(flight: &Flight, targets: &[Target]) -> Option<Cause> {
     let (first, last) = (targets.first()?, targets.last()?);
     let apart = targets.iter().all(|target| target.end_s < from || target.start_s > to);
     let (log_s, plan_s) = ([from, to], [first.start_s, last.end_s]);
-    apart.then_some(Cause::OtherTime { log_s, plan_s })
+    // The clock of a log that reaches into its show is right: the flight was short, or its log is.
+    let is_short = (0.0..first.start_s).contains(&to);
+    apart.then_some(if is_short {
+        let height_m = flight.cut_off_at_m;
+        Cause::EndsBefore { end_s: to, first_s: first.start_s, height_m }
+    } else {
+        Cause::OtherTime { log_s, plan_s }
+    })
 }
 
 /// The true air over the hover as the map sees it: means over the 10 s around each second.
@@ -375,4 +386,43 @@ fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
         trace.moved_m.clear();
     }
     trace
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::plan::SegmentKind;
+
+    /// Why a log from and to these times, s, that ends at this height, holds nothing of a window from 47 to 156 s.
+    fn why(from_s: f64, to_s: f64, cut_off_at_m: Option<f64>) -> Option<String> {
+        let velocity_up_mps = Series { time_s: vec![from_s, to_s], value: vec![0.0; 2] };
+        let flight = Flight { velocity_up_mps, cut_off_at_m, ..Flight::default() };
+        let window = Target {
+            kind: SegmentKind::Hover,
+            label: "hover".to_owned(),
+            start_s: 47.0,
+            end_s: 156.0,
+            commanded_mps: 0.0,
+        };
+        elsewhere(&flight, &[window]).map(|cause| cause.to_string())
+    }
+
+    #[test]
+    fn a_log_that_ends_before_the_first_window_has_no_wrong_clock() {
+        assert_eq!(
+            why(-6.0, 13.0, Some(27.3)).unwrap(),
+            "the log ends in the air, 27.3 m above the ground, 13.0 s after the show's start, before the plan's \
+             first window (from 47 s): there is nothing to measure in it"
+        );
+        assert_eq!(
+            why(-6.0, 40.0, None).unwrap(),
+            "the flight ends 40.0 s after the show's start, before the plan's first window (from 47 s): there is \
+             nothing to measure in it"
+        );
+        for (from_s, to_s) in [(3594.0, 3682.0), (-3606.0, -3518.0)] {
+            let said = why(from_s, to_s, None).unwrap();
+            assert!(said.contains("the drone's clock jumped or was set wrong"), "{said}");
+        }
+        assert_eq!(why(-6.0, 60.0, Some(20.0)), None, "a part of the window is there");
+    }
 }

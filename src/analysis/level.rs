@@ -109,10 +109,7 @@ impl LevelledMap {
                 String::new()
             };
             let legs = drone.legs_slope.map_or_else(String::new, |slope| {
-                format!(
-                    "; the calibration's legs have {slope:.0} {unit} per m/s: this is hardly the response of this \
-                     drone, and its values are no measurement"
-                )
+                format!(" (the calibration's legs have {slope:.0}: see the cautions)")
             });
             format!(
                 "{}: {:.0} {unit} per m/s{wind}{legs}; the level is known to \u{b1}{:.2} m/s (95 %); {:.0} % of the values' \

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::cause::Cause;
 use crate::base::crc::ap_crc32;
+use crate::base::file::open_named;
 use crate::base::frame::Geodetic;
 use crate::log::Log;
 use crate::mission::plan::Plan;
@@ -321,21 +322,56 @@ fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String>
         .collect()
 }
 
-/// For each log, the earlier one that has the very same bytes.
-pub(super) fn same_bytes(logs: &[Option<&Log>]) -> Vec<Option<usize>> {
-    let mut sizes: BTreeMap<u64, Vec<(usize, &Log)>> = BTreeMap::new();
+/// A file whose bytes can be compared.
+#[derive(Clone, Copy)]
+pub(super) enum Held<'a> {
+    /// A log that was opened.
+    Log(&'a Log),
+    /// A table, with its size in bytes.
+    Table(&'a Path, u64),
+}
+
+impl<'a> Held<'a> {
+    /// A table that can be read more than once; `None`: it cannot (a pipe), or is empty.
+    pub(super) fn table(path: &'a Path) -> Option<Self> {
+        let metadata = std::fs::metadata(path).ok()?;
+        (metadata.is_file() && metadata.len() > 0).then_some(Self::Table(path, metadata.len()))
+    }
+
+    fn size_bytes(self) -> u64 {
+        match self {
+            Self::Log(log) => log.size_bytes(),
+            Self::Table(_, size) => size,
+        }
+    }
+
+    /// The bytes; none where the file cannot be opened any more.
+    fn reader(self) -> Box<dyn Read + 'a> {
+        match self {
+            Self::Log(log) => log.reader(),
+            Self::Table(path, size) => match open_named(path) {
+                Ok(file) => Box::new(file.take(size)),
+                Err(_) => Box::new(std::io::empty()),
+            },
+        }
+    }
+}
+
+/// For each file, the earlier one that has the very same bytes.
+pub(super) fn same_bytes(logs: &[Option<Held<'_>>]) -> Vec<Option<usize>> {
+    let mut sizes: BTreeMap<u64, Vec<(usize, Held<'_>)>> = BTreeMap::new();
     for (index, log) in logs.iter().enumerate() {
-        let Some(log) = log else { continue };
+        let Some(log) = *log else { continue };
         sizes.entry(log.size_bytes()).or_default().push((index, log));
     }
     let mut result = vec![None; logs.len()];
     for (size, logs) in sizes.into_iter().filter(|(_, logs)| logs.len() > 1) {
         // Logs of one flight may all have one size, but differ early, at the first row with a time.
-        let starts: Vec<u32> = logs.par_iter().map(|(_, log)| start_of(log)).collect();
-        let mut first: BTreeMap<u32, Vec<(usize, &Log)>> = BTreeMap::new();
+        let starts: Vec<u32> = logs.par_iter().map(|(_, log)| start_of(*log)).collect();
+        let mut first: BTreeMap<u32, Vec<(usize, Held<'_>)>> = BTreeMap::new();
         for ((index, log), start) in logs.into_iter().zip(starts) {
             let alike = first.entry(start).or_default();
-            match alike.iter().find(|(_, earlier)| are_same(earlier, log, size)) {
+            match alike.iter().find(|(_, earlier)| are_same(*earlier, log, size)) {
                 Some((earlier, _)) => result[index] = Some(*earlier),
                 None => alike.push((index, log)),
             }
@@ -345,7 +381,7 @@ pub(super) fn same_bytes(logs: &[Option<&Log>]) -> Vec<Option<usize>> {
 }
 
 /// Checksum of the beginning of a log.
-fn start_of(log: &Log) -> u32 {
+fn start_of(log: Held<'_>) -> u32 {
     const START_BYTES: u64 = 1 << 18;
     let mut start = Vec::new();
     // What cannot be read differs from everything, and is named when it is read.
@@ -353,8 +389,8 @@ fn start_of(log: &Log) -> u32 {
     ap_crc32(&start)
 }
 
-/// Whether two logs of `size` bytes are the same, byte by byte.
-fn are_same(one: &Log, other: &Log, size: u64) -> bool {
+/// Whether two files of `size` bytes are the same, byte by byte.
+fn are_same(one: Held<'_>, other: Held<'_>, size: u64) -> bool {
     const PIECE_BYTES: u64 = 1 << 17;
     let (mut one, mut other) = (one.reader(), other.reader());
     let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -378,7 +414,7 @@ fn are_same(one: &Log, other: &Log, size: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Log, file_number, same_bytes};
+    use super::{Held, Log, file_number, same_bytes};
     use std::path::Path;
 
     #[test]
@@ -402,11 +438,33 @@ mod tests {
         let short = |text: &[u8]| Log::from_bytes(text.to_vec());
         let logs = [short(b"abc"), short(b"abd"), short(b"abc"), short(b"ab"), short(b"abc")];
         let more = [long(1), long(2), long(1)];
-        let mut all: Vec<Option<&Log>> = logs.iter().chain(&more).map(Some).collect();
+        let mut all: Vec<Option<Held<'_>>> =
+            logs.iter().chain(&more).map(|log| Some(Held::Log(log))).collect();
         all.insert(3, None);
         assert_eq!(
             same_bytes(&all),
             [None, None, Some(0), None, None, Some(0), None, None, Some(6)]
         );
+    }
+
+    #[test]
+    fn copies_of_tables_are_told_by_their_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let paths = [
+            file("a.csv", "time\n1\n"),
+            file("b.csv", "time\n2\n"),
+            file("c.csv", "time\n1\n"),
+            file("empty.csv", ""),
+            folder.path().join("none.csv"),
+        ];
+        let mut tables: Vec<Option<Held<'_>>> =
+            paths.iter().map(|path| Held::table(path)).collect();
+        tables.push(tables[1]);
+        assert_eq!(same_bytes(&tables), [None, None, Some(0), None, None, Some(1)]);
     }
 }

@@ -82,4 +82,5 @@ pub use input::{AtHand, FlightInput, LogInput, TruthSeries};
 pub use law::LawKind;
 pub use levelled::Level;
 pub use options::{AnalysisOptions, OffsetRule};
+pub(crate) use running::RUNNING_S;
 pub use warning::{Warning, WindHandled};

@@ -3,7 +3,7 @@
 use crate::flight::Series;
 
 /// Length of the running window, s: the paper's.
-pub(super) const RUNNING_S: f64 = 10.0;
+pub(crate) const RUNNING_S: f64 = 10.0;
 /// A silence longer than this breaks a running window, s: a tenth of it. Chosen.
 pub(super) const GAP_S: f64 = 1.0;
 

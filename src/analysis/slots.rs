@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::cause::Cause;
 use super::input::{FlightInput, LogInput};
-use super::matching::{self, Candidate, Matched};
+use super::matching::{self, Candidate, Held, Matched};
 use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
 use crate::flight::identify;
@@ -39,8 +39,14 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     let opened: Vec<Result<Log, Cause>> = (input.logs.par_iter())
         .map(|log| Log::open(&log.path).map_err(|error| unreadable(log, &error)))
         .collect();
-    let logs: Vec<Option<&Log>> =
-        opened.iter().map(|log| log.as_ref().ok().filter(|log| log.size_bytes() > 0)).collect();
+    let logs: Vec<Option<Held<'_>>> = opened
+        .iter()
+        .zip(input.logs)
+        .map(|(opened, log)| match &log.table {
+            Some(_) => Held::table(&log.path),
+            None => opened.as_ref().ok().filter(|log| log.size_bytes() > 0).map(Held::Log),
+        })
+        .collect();
     let copies = matching::same_bytes(&logs);
     let Some(plan) = input.plan else {
         let refused = |first: usize| {

@@ -3,7 +3,8 @@
 use std::fmt::{self, Write as _};
 
 use super::calibrate::CalibrationError;
-use super::cause::{Cause, later};
+use super::cause::later;
+use super::caution::STEEP_DEG;
 use super::fit_warning::W_LIMIT_MPS;
 use super::ladder::{FEWEST_RUNGS, Ladder, PartialLadder};
 use super::windows::Tilt;
@@ -19,8 +20,6 @@ const NAMED: usize = 8;
 pub enum Warning {
     /// A doubt about a drone's log.
     Log(flight::Warning),
-    /// Nothing of the plan is in a drone's log.
-    NothingOfPlan(Cause),
     /// The clock of a drone counts from its take-off.
     TakeoffClock,
     /// A drone's own law is of a part of the ladder, and the map takes the flock's.
@@ -99,6 +98,20 @@ pub enum Warning {
         /// Slope of the line, the indicator's unit per m/s.
         slope: f64,
     },
+    /// Angles of tables are steeper than drones fly.
+    Steep {
+        /// Names of the drones.
+        drones: Vec<String>,
+        /// Share of the rows that are so steep, of the steepest drone.
+        share: f64,
+    },
+    /// A vehicle's response is not the one that the calibration's legs show.
+    OtherResponse {
+        /// Names of the drones, their slopes in the hover and those of the legs, the indicator's unit per m/s.
+        drones: Vec<(String, [f64; 2])>,
+        /// Indicator of rotor effort.
+        indicator: Indicator,
+    },
     /// No laws are there to measure the air with.
     NoCalibration,
     /// A flight without a plan has some climbs, but too few for a calibration.
@@ -162,7 +175,6 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Log(warning) => warning.fmt(f),
-            Self::NothingOfPlan(cause) => cause.fmt(f),
             Self::TakeoffClock => f.write_str(
                 "times count from take-off: windows may be shifted against the plan",
             ),
@@ -213,6 +225,18 @@ impl fmt::Display for Warning {
             ),
             Self::TiltForm { used, indicator, change, error, slope } => {
                 tilt_form(f, *used, indicator.unit(), [*change, *error, *slope])
+            }
+            Self::Steep { drones, share } => write!(
+                f,
+                "angles: roll or pitch of {} is beyond {STEEP_DEG:.0} degrees in {:.0} % of the rows, and no \
+                 drone flies so: are the columns in degrees, and read as radians? Then give [roll] and [pitch] \
+                 scale = 0.0174533 in the mapping (radians need no scale). Until then the values are no \
+                 measurement",
+                listed(drones),
+                100.0 * share
+            ),
+            Self::OtherResponse { drones, indicator } => {
+                other_response(f, drones, indicator.unit())
             }
             Self::NoCalibration => f.write_str(
                 "no calibration was given: the air cannot be measured without laws. Analyse the \
@@ -333,6 +357,25 @@ fn tilt_form(
          which is more than its error of {error:.1} {unit} and reads as {:+.2} m/s of updraft where a \
          hover leans alike",
         -change / slope
+    )
+}
+
+fn other_response(
+    f: &mut fmt::Formatter<'_>,
+    drones: &[(String, [f64; 2])],
+    unit: &str,
+) -> fmt::Result {
+    let named: Vec<String> = drones
+        .iter()
+        .map(|(name, [hover, legs])| format!("{name} ({hover:.0} against {legs:.0})"))
+        .collect();
+    write!(
+        f,
+        "response: {} per m/s in the hover, by the vehicle, are not those of the calibration's legs: {}. This is \
+         hardly the response of this drone, and its values are no measurement. See that --vehicle is the drone that \
+         flew, and that the mapping's columns, signs and scales are right",
+        unit,
+        listed(&named)
     )
 }
 

@@ -21,9 +21,17 @@ pub(super) struct FleetAir {
     /// Mean standard error and mean systematic error of one drone, m/s.
     pub(super) se: f64,
     pub(super) systematic: f64,
+    /// Whether that systematic error is half a 95 % interval, of an error within the standard error.
+    pub(super) is_in_budget: bool,
     /// Root mean square over drones of the estimated mean minus the true mean, m/s.
     pub(super) rms_error: Option<f64>,
     pub(super) n: usize,
+}
+
+/// Whether a drone's standard error has all that is known of its errors, wind with them. Then its systematic error is
+/// the half width of a 95 % interval; else it is a bound beside the standard error.
+fn is_in_budget(drone: &DroneUpdraft) -> bool {
+    drone.errors.total_mps > 0.0
 }
 
 /// Error of the mean over a fleet, m/s.
@@ -41,7 +49,9 @@ impl MeanError {
     fn of(map: &UpdraftMap) -> Self {
         let known = || map.drones.iter().filter(|drone| usable(drone.mean.value));
         let one = mean(known().map(|drone| drone.mean.se)).unwrap_or(0.0);
-        let systematic = mean(known().map(|drone| drone.systematic_mps)).unwrap_or(0.0);
+        // A budget has the wind in it.
+        let beside = known().map(|d| if is_in_budget(d) { 0.0 } else { d.systematic_mps });
+        let systematic = mean(beside).unwrap_or(0.0);
         match map.common.filter(|common| usable(common.se_mps)) {
             // One drone shares with nobody: its own error and interval are all there is.
             Some(_) if known().count() == 1 => {
@@ -83,6 +93,23 @@ impl MeanError {
 }
 
 impl FleetAir {
+    /// `standard error of one drone: 0.28 m/s; of it systematic, from wind on the leaning drones: ±0.12 m/s (95 %)`.
+    pub(super) fn one_drone_words(&self) -> String {
+        let systematic = fixed(self.systematic, 2);
+        let wind = match (self.systematic > 0.005, self.is_in_budget) {
+            (false, _) => String::new(),
+            (true, true) => {
+                format!(
+                    "; of it systematic, from wind on the leaning drones: ±{systematic} m/s (95 %)"
+                )
+            }
+            (true, false) => {
+                format!("; systematic, from wind on the leaning drones: {systematic} m/s")
+            }
+        };
+        format!("standard error of one drone: {} m/s{wind}", fixed(self.se, 3))
+    }
+
     /// `0.15 m/s between 42 drones`; absent for one drone.
     pub(super) fn spread_words(&self) -> Option<String> {
         (self.n > 1)
@@ -105,6 +132,7 @@ pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
         highest: most(means.clone())?,
         se: mean(map.drones.iter().map(|drone| drone.mean.se)).unwrap_or(0.0),
         systematic: mean(map.drones.iter().map(|drone| drone.systematic_mps)).unwrap_or(0.0),
+        is_in_budget: map.drones.iter().all(is_in_budget),
         rms_error: mean(squares).map(f64::sqrt),
         n: means.count(),
     })
@@ -190,5 +218,25 @@ mod tests {
         let air = fleet_air(&map(1, Some(common))).unwrap();
         assert_eq!(air.error, MeanError { se: 0.5, half_width: Some(1.1) });
         assert_eq!(air.spread_words(), None);
+    }
+
+    #[test]
+    fn wind_that_is_in_a_budget_is_not_added_again() {
+        let mut map = map(1, None);
+        map.drones[0].systematic_mps = 1.2;
+        let beside = fleet_air(&map).unwrap();
+        assert!((beside.error.se - 1.3).abs() < 1e-12, "{:?}", beside.error);
+        assert_eq!(
+            beside.one_drone_words(),
+            "standard error of one drone: 0.500 m/s; systematic, from wind on the leaning drones: 1.20 m/s"
+        );
+        map.drones[0].errors.total_mps = 0.5;
+        let within = fleet_air(&map).unwrap();
+        assert_eq!(within.error, MeanError { se: 0.5, half_width: Some(1.1) });
+        assert_eq!(
+            within.one_drone_words(),
+            "standard error of one drone: 0.500 m/s; of it systematic, from wind on the leaning drones: ±1.20 m/s \
+             (95 %)"
+        );
     }
 }

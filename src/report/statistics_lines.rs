@@ -1,5 +1,6 @@
 //! The statistics of a hover in a few lines, beside the paper's values.
 
+use crate::analysis::RUNNING_S;
 use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{FieldStatistics, Scale};
 
@@ -48,7 +49,15 @@ fn time(statistics: &FieldStatistics) -> Option<String> {
     let likelihood = model.map_or_else(String::new, |model| {
         format!("; correlation time of maximum likelihood: {}", value(&model.tau_s, "s"))
     });
-    Some(format!("zero crossing t₀ {}{likelihood}", with_paper(scale, "s")))
+    // Running means of noise cross zero where they no longer overlap.
+    let of_means = if scale.undetermined.is_none() && scale.value <= RUNNING_S {
+        format!(
+            "; running means of {RUNNING_S:.0} s have such a crossing of themselves, in noise too"
+        )
+    } else {
+        String::new()
+    };
+    Some(format!("zero crossing t₀ {}{of_means}{likelihood}", with_paper(scale, "s")))
 }
 
 fn directions(statistics: &FieldStatistics) -> Option<String> {

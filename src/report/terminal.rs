@@ -326,25 +326,13 @@ impl Output {
         if let Some(reason) = &map.law_reason {
             self.wrapped(DIM, "  ", &format!("Law of the map: {}.", clean(reason)));
         }
-        let systematic = if air.systematic > 0.005 {
-            format!(
-                "; systematic, from wind on the leaning drones: {} m/s",
-                fixed(air.systematic, 2)
-            )
-        } else {
-            String::new()
-        };
-        self.wrapped(
-            "",
-            "  ",
-            &format!("standard error of one drone: {} m/s{systematic}", fixed(air.se, 3)),
-        );
+        self.wrapped("", "  ", &air.one_drone_words());
         if let Some(common) = &map.common {
             self.wrapped(
                 "",
                 "  ",
                 &format!(
-                    "of that common to all drones: {} m/s (zero {}, battery {}, wind {}, density \
+                    "standard error that all drones have in common: {} m/s (zero {}, battery {}, wind {}, density \
                      {}); 95 % interval of the common shift: ±{} m/s",
                     fixed(common.se_mps, 3),
                     fixed(common.zero_mps, 3),

@@ -114,6 +114,15 @@ fn needed(one: &BaselineOf) -> String {
     text
 }
 
+/// Whether the bound of the fleet's length is none beside a drone's, which is known: it is too short to be told, or longer.
+fn exceeds(fleet: &BaselineOf, drone: &BaselineOf) -> bool {
+    let longer = fleet.needed.iter().zip(&drone.needed).all(|(fleet, drone)| {
+        let low = fleet.interval_min.low;
+        low < SHORTEST_MIN || low > drone.interval_min.high
+    });
+    !drone.is_open && longer
+}
+
 fn sentence(found: &Baseline) -> String {
     let drone = &found.drone;
     let Interval { low, high } = drone.integral_time_interval_s;
@@ -129,7 +138,13 @@ fn sentence(found: &Baseline) -> String {
         drone.sd_mps
     );
     if let Some(fleet) = &found.fleet {
-        let _ = write!(text, "; the mean of all drones needs {}", needed(fleet));
+        // The mean of all drones is no noisier than one: its record tells less of it, and not that it needs longer.
+        let told = if fleet.is_open && exceeds(fleet, drone) {
+            "no more than that".to_owned()
+        } else {
+            needed(fleet)
+        };
+        let _ = write!(text, "; the mean of all drones needs {told}");
     }
     let _ = write!(
         text,
@@ -211,6 +226,46 @@ mod tests {
         assert_eq!(
             super::needed(&of(0.01)),
             "a time that this record does not tell for 0.1 m/s or 0.2 m/s"
+        );
+    }
+
+    #[test]
+    fn the_mean_of_all_drones_never_needs_longer_than_a_drone() {
+        let of = |is_open: bool, [low, high]: [f64; 2]| BaselineOf {
+            sd_mps: 0.0,
+            sd_interval_mps: Interval { low: 0.0, high: 0.0 },
+            integral_time_s: 1.0,
+            integral_time_interval_s: Interval { low: 1.0, high: 1.0 },
+            is_open,
+            needed: ERRORS_MPS
+                .map(|error_mps| {
+                    let interval_min = Interval { low, high };
+                    NeededAverage { error_mps, minutes: low, interval_min }
+                })
+                .into(),
+        };
+        let words = |drone: BaselineOf, fleet: BaselineOf| {
+            sentence(&Baseline { record_s: 589.0, drone, fleet: Some(fleet), words: String::new() })
+        };
+        let quiet = || of(false, [0.0, 0.001]);
+        let said = words(quiet(), of(true, [0.0, 900.0]));
+        assert!(
+            said.contains(
+                "T of 1 s (95 %: 1 to 1); the mean of all drones needs no more than that;"
+            ),
+            "{said}"
+        );
+        let said = words(quiet(), of(true, [0.3, 900.0]));
+        assert!(said.contains("the mean of all drones needs no more than that;"), "{said}");
+        let said = words(of(false, [1.0, 94.0]), of(true, [0.7, 900.0]));
+        assert!(
+            said.contains("the mean of all drones needs more than 0.7 min for 0.1 m/s"),
+            "{said}"
+        );
+        let said = words(of(true, [0.0, 900.0]), of(true, [0.0, 900.0]));
+        assert!(
+            said.contains("the mean of all drones needs a time that this record does not tell"),
+            "{said}"
         );
     }
 

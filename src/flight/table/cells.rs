@@ -9,6 +9,9 @@ use crate::numeric::median;
 const MOST_TIMES: f64 = 3.0;
 /// Where more than this share of the cells is so high, the median is that of a drone at rest, and they are its flight.
 const MOST_SHARE: f64 = 0.1;
+/// A column that is 0 or less in more than this share of the rows in which another one is above is of a rotor that
+/// stands, or that is not measured: its other cells are no flight of that drone either.
+const DEAD_SHARE: f64 = 0.5;
 /// No drone and no air is faster, m/s.
 const FASTEST_MPS: f64 = 100.0;
 
@@ -17,6 +20,17 @@ const FASTEST_MPS: f64 = 100.0;
 enum Kind {
     Effort,
     Velocity,
+}
+
+/// A column without a rotor effort, while the others have one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Dead {
+    /// Number of the column in its channel, from 0.
+    pub(super) column: usize,
+    /// Rows in which it is 0 or less.
+    pub(super) standing: usize,
+    /// Rows in which another column is above 0.
+    pub(super) turning: usize,
 }
 
 /// The cells of a channel, in our unit, row by row.
@@ -38,6 +52,26 @@ impl Cells {
             _ => return None,
         };
         Some(Self { kind, values: Vec::new(), lines: Vec::new() })
+    }
+
+    /// The first column of a rotor effort that is none in most of the rows in which the others are one.
+    pub(super) fn dead(&self, columns: usize) -> Option<Dead> {
+        if self.kind != Kind::Effort || columns < 2 {
+            return None;
+        }
+        let look = |column: usize| {
+            let (mut standing, mut turning) = (0, 0);
+            for row in self.values.chunks_exact(columns) {
+                let mut others = row.iter().enumerate().filter(|(index, _)| *index != column);
+                if others.any(|(_, value)| *value > 0.0) {
+                    turning += 1;
+                    standing += usize::from(row.get(column).is_some_and(|value| *value <= 0.0));
+                }
+            }
+            Dead { column, standing, turning }
+        };
+        let is_dead = |found: &Dead| found.standing as f64 > DEAD_SHARE * found.turning as f64;
+        (0..columns).map(look).find(is_dead)
     }
 
     /// Whether each row has a cell that cannot be, and a sentence for each column and reason.
@@ -131,6 +165,27 @@ mod tests {
         // Rotors that stand for most of the time have no median to go by.
         let values: Vec<f64> = (0..80).map(|cell| if cell < 50 { 0.0 } else { 5400.0 }).collect();
         assert_eq!(told("effort", values), (0, Vec::new()));
+    }
+
+    #[test]
+    fn a_column_that_is_nothing_while_the_others_turn_is_dead() {
+        let dead = |values: Vec<f64>| {
+            let lines = (2..).take(values.len() / 2).collect();
+            Cells { values, lines, ..Cells::of("effort").unwrap() }.dead(2)
+        };
+        let rows = |first: f64, second: f64| [first, second].repeat(40);
+        let found = dead([rows(0.0, 0.0), rows(5400.0, 0.0)].concat());
+        assert_eq!(
+            found,
+            Some(Dead { column: 1, standing: 40, turning: 40 }),
+            "at rest both are 0"
+        );
+        assert_eq!(dead([rows(5400.0, 5300.0), rows(5400.0, 0.0)].concat()), None, "half of it");
+        assert_eq!(dead(rows(0.0, 0.0)), None);
+        let cells = Cells { values: vec![0.0; 40], ..Cells::of("effort").unwrap() };
+        assert_eq!(cells.dead(1), None, "there is nothing beside it");
+        let cells = Cells { values: rows(3.0, 0.0), ..Cells::of("velocity_up").unwrap() };
+        assert_eq!(cells.dead(2), None, "velocities may be 0");
     }
 
     #[test]

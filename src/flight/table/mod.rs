@@ -63,6 +63,24 @@ pub enum TableError {
         /// Statement of the problem with the cell.
         reason: String,
     },
+    /// A rotor stands, or is not measured, while the others turn.
+    #[error(
+        "{}: \"{column}\" is 0 or less in {standing} of {turning} rows in which the other columns of {channel} are not: \
+         a mean with it is no rotor effort; leave the column out of [{channel}] for all flights of the mapping",
+        path.shown()
+    )]
+    Dead {
+        /// Path of the table.
+        path: PathBuf,
+        /// Name of the column.
+        column: String,
+        /// Quantity that the column is a part of.
+        channel: &'static str,
+        /// Number of rows in which the column alone is 0 or less.
+        standing: usize,
+        /// Number of rows in which another column of the channel is above 0.
+        turning: usize,
+    },
     /// A line cannot be read.
     #[error("{}: {reason}", path.shown())]
     Row {

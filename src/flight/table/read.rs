@@ -6,7 +6,7 @@ use std::io::{self, BufRead as _, BufReader, Read};
 use std::path::Path;
 
 use super::TableError;
-use super::cells::Cells;
+use super::cells::{Cells, Dead};
 use super::mapping::{Channel, Mapping, TimeColumn, TimeFormat};
 use super::time::date_time;
 use crate::base::file::{FileError, open_named};
@@ -261,7 +261,7 @@ fn columns_from(bytes: impl Read, path: &Path, wish: &Wish<'_>) -> Result<Column
         let Rows { taken, backward, .. } = rows;
         return Err(TableError::Short { path: path.to_owned(), rows: taken, backward });
     }
-    Ok(rows.columns(cut_off.is_some()))
+    rows.dead().map_or_else(|| Ok(rows.columns(cut_off.is_some())), Err)
 }
 
 /// Where a table's columns are.
@@ -354,6 +354,16 @@ impl Rows<'_> {
             one.take((show_s, line), row).map_err(|(column, reason)| cell(&column, reason))?;
         }
         Ok(())
+    }
+
+    /// That a rotor's column has nothing while the others turn.
+    fn dead(&self) -> Option<TableError> {
+        self.table.channels.iter().find_map(|(channel, one)| {
+            let Dead { column, standing, turning } = one.cells.as_ref()?.dead(one.columns.len())?;
+            let (_, name) = one.columns.get(column)?;
+            let (path, column) = (self.path.to_owned(), (*name).to_owned());
+            Some(TableError::Dead { path, column, channel, standing, turning })
+        })
     }
 
     /// What must be known of how the table was read.

@@ -24,15 +24,11 @@ pub(super) fn distrust(analysis: &Analysis) -> Vec<String> {
     let mut doubts: Vec<Doubt> =
         analysis.warnings.iter().map(|warning| (0, sentence(&warning.to_string()))).collect();
     for flight in &analysis.flights {
+        let name = format!("{}: ", capitalised(&clean(&flight.name)));
         let of = |(badness, words): Doubt| {
-            (
-                badness,
-                if several {
-                    format!("{}: {words}", capitalised(&clean(&flight.name)))
-                } else {
-                    words
-                },
-            )
+            // A caution about a scan begins so, and a flight may be called that.
+            let is_named = !several || words.starts_with(&name);
+            (badness, if is_named { words } else { format!("{name}{words}") })
         };
         doubts.extend(lost(flight).map(of));
         doubts.extend(damaged(flight).map(of));
@@ -170,7 +166,11 @@ fn too_narrow(map: &UpdraftMap) -> Option<Doubt> {
 fn doubt(warning: &Warning) -> Doubt {
     let own = || sentence(&warning.to_string());
     match warning {
-        Warning::WhoseLogs(_) | Warning::Failed(_) | Warning::LawsOfOthers { .. } => (0, own()),
+        Warning::WhoseLogs(_)
+        | Warning::Failed(_)
+        | Warning::LawsOfOthers { .. }
+        | Warning::Steep { .. }
+        | Warning::OtherResponse { .. } => (0, own()),
         Warning::NoLaw | Warning::NoFlock(_) | Warning::NoCalibration | Warning::NoLadder { .. } => (1, own()),
         Warning::FewWindows { .. } | Warning::FleetLadder { .. } | Warning::OtherStart { .. } => (2, own()),
         Warning::Wind { corrected, error_mps, .. } => (

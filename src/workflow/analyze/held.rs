@@ -124,7 +124,8 @@ fn other_slots(reference: &FlightAnalysis, plan: &Plan) -> Vec<String> {
     let mut reasons = Vec::new();
     if known && fleet != plan.slots.len() {
         reasons.push(format!(
-            "they are {fleet} drones, and {} has {}",
+            "they are {}, and {} has {}",
+            if fleet == 1 { "of 1 drone".to_owned() } else { format!("{fleet} drones") },
             plan.name,
             plan.slots.len()
         ));

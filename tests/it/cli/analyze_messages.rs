@@ -89,6 +89,23 @@ fn a_log_an_hour_off_in_all_its_clocks_says_so() {
 }
 
 #[test]
+fn a_log_that_ends_before_the_first_window_says_so_and_is_not_used() {
+    let bench = campaign();
+    let log = fs::OpenOptions::new().write(true).open(bench.path(HOVER)).unwrap();
+    // After take-off, and before the window from 23 to 52 s: 88 s have been logged.
+    log.set_len(log.metadata().unwrap().len() / 5).unwrap();
+    let told = analyze(&bench, 3);
+    let said = about(&told, "the log ends in the air");
+    assert!(
+        said.contains(" s after the show's start, before the plan's first window (from 23 s)"),
+        "{said}"
+    );
+    assert!(!told.out.contains("what it holds is analysed"), "{told}");
+    assert!(!told.out.contains("clock jumped"), "{told}");
+    assert!(told.out.contains("Logs not used (1)"), "{told}");
+}
+
+#[test]
 fn what_the_papers_method_does_not_say_is_said() {
     let bench = campaign();
     let told = bench.expect(0, &["analyze", "campaign", "--no-report", "--paper"]);

@@ -80,6 +80,7 @@ fn the_table_has_the_places_and_the_report_the_track() {
     assert!(ended.out.contains("scan: the drones moved"), "{ended}");
     let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
     assert!(page.contains("Vertical air speed along the track, scan"));
+    assert!(!page.contains("Scan: Scan:"), "a flight's name before its own caution");
     let figure = fs::read_to_string(bench.path("campaign/report/figures/track-scan.svg")).unwrap();
     assert!(figure.contains("way flown (m)") && figure.contains("true air"));
 

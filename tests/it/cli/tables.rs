@@ -175,6 +175,44 @@ fn one_wrong_table_does_not_stop_the_others() {
 }
 
 #[test]
+fn the_same_table_twice_is_one_drone() {
+    let bench = Bench::new();
+    let mapping = MAPPING.replace("[\"ladder.csv\"]", "[\"ladder.csv\", \"ladder.csv\"]");
+    let ended = analyze(&bench, 3, &mapping, &table());
+    assert!(ended.out.contains("1 of 2 logs used"), "{ended}");
+    assert!(ended.out.contains("ladder.csv: a copy of ladder.csv (the same bytes)"), "{ended}");
+}
+
+#[test]
+fn a_rotor_that_stands_alone_is_refused_by_name() {
+    let bench = Bench::new();
+    let mut rows = table();
+    for row in &mut rows[1..] {
+        let mut cells: Vec<&str> = row.split(',').collect();
+        cells[2] = "0";
+        *row = cells.join(",");
+    }
+    let ended = analyze(&bench, 5, MAPPING, &rows);
+    let words = "ladder.csv: \"motor 2\" is 0 or less in 420 of 420 rows in which the other columns of effort are not: a \
+                 mean with it is no rotor effort; leave the column out of [effort]";
+    let told = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains(words), "{ended}");
+}
+
+#[test]
+fn degrees_that_are_read_as_radians_are_a_caution() {
+    let bench = Bench::new();
+    let rows: Vec<String> =
+        table().iter().map(|row| row.replace(",0.01,-0.01", ",2.9,-1.2")).collect();
+    let ended = analyze(&bench, 0, MAPPING, &rows);
+    let cautions = ended.out.split("Cautions").nth(1).unwrap_or_default();
+    let told = cautions.split_whitespace().collect::<Vec<_>>().join(" ");
+    let words = "angles: roll or pitch of ladder is beyond 45 degrees in 100 % of the rows";
+    assert!(told.contains(words) && told.contains("scale = 0.0174533"), "{ended}");
+    assert!(!ended.out.contains("ladder: angles"), "it is said once: {ended}");
+}
+
+#[test]
 fn what_can_be_read_is_read_and_the_rest_is_told() {
     let bench = Bench::new();
     // A mark at the start, rows that go back, empty and infinite cells, a last line that is cut off.
