@@ -93,6 +93,10 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
                 let place = Role::RotorDrag.place()?;
                 let Interval { value, low, high } = widened(wind.lean_per_mps?, measured.law);
                 let beside = beside_rotor_drag(&before.vehicle, wind.model_lean_per_mps);
+                // Who leans less than its frame does by itself lacks no drag, and there is none below nothing.
+                if value < beside {
+                    return None;
+                }
                 vec![Fitted {
                     name: place.parameter.name.to_owned(),
                     unit: place.parameter.unit.to_owned(),
@@ -275,16 +279,21 @@ mod tests {
     #[test]
     fn a_drag_that_leans_tell_comes_on_top_of_the_frame_s_own() {
         let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
-        let mut named = |vehicle: Vehicle| {
+        let mut told = |vehicle: Vehicle, more: f64| {
             let model = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
             comparison.vehicle = vehicle;
-            let law = LeanLaw { linear: model.linear + 0.03, ..model };
+            let law = LeanLaw { linear: model.linear + more, ..model };
             comparison.wind.measured = Some(Measured { law, linear_se: 1e-3, misfit_nats: 0.0 });
-            let step = step(&comparison, &found(&comparison), 0.005).unwrap();
-            let Finding::Class { parameters, .. } = step.finding else { panic!() };
-            (parameters[0].value.value, model.linear)
+            Some((step(&comparison, &found(&comparison), 0.005)?, model.linear))
         };
-        let (size, own) = named(crate::vehicle::library::builtin("arducopter-sitl").unwrap());
+        let sitl = || crate::vehicle::library::builtin("arducopter-sitl").unwrap();
+        assert!(told(sitl(), -0.015).is_none(), "there is no drag below nothing");
+        let mut named = |vehicle: Vehicle| {
+            let (step, own) = told(vehicle, 0.03).unwrap();
+            let Finding::Class { parameters, .. } = step.finding else { panic!() };
+            (parameters[0].value.value, own)
+        };
+        let (size, own) = named(sitl());
         assert!(own > 0.02, "the frame leans in wind by itself: {own}");
         assert!((size - 0.03).abs() < 0.003, "{size}");
         let mut with_momentum = trial::vehicle();
