@@ -49,16 +49,21 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
         .collect();
     let copies = matching::same_bytes(&logs);
     let Some(plan) = input.plan else {
-        let refused = |first: usize| {
-            let first = input.logs.get(first).map(|log| input.shown(&log.path));
-            let reason = Cause::Copy { of: first.unwrap_or_default() };
+        let refused = |first: usize, log: &LogInput| {
+            let first =
+                input.logs.get(first).map_or(log.path.as_path(), |first| first.path.as_path());
+            let reason = if first == log.path {
+                Cause::Refused("it is given twice, and used once".to_owned())
+            } else {
+                Cause::Copy { of: input.shown(first) }
+            };
             SlotMatch::Refused { reason, meant_for: None }
         };
         let slots = copies.into_iter().zip(input.logs).map(|(copy, log)| match &log.refused {
             Some(reason) => {
                 SlotMatch::Refused { reason: Cause::Refused(reason.clone()), meant_for: None }
             }
-            None => copy.map_or(SlotMatch::Unplanned, refused),
+            None => copy.map_or(SlotMatch::Unplanned, |first| refused(first, log)),
         });
         return (slots.collect(), Vec::new());
     };

@@ -367,14 +367,15 @@ fn other_response(
 ) -> fmt::Result {
     let named: Vec<String> = drones
         .iter()
-        .map(|(name, [hover, legs])| format!("{name} ({hover:.0} against {legs:.0})"))
+        .map(|(name, [hover, legs])| {
+            format!("{name} ({hover:.0} against {legs:.0} {unit} per m/s)")
+        })
         .collect();
     write!(
         f,
-        "response: {} per m/s in the hover, by the vehicle, are not those of the calibration's legs: {}. This is \
-         hardly the response of this drone, and its values are no measurement. See that --vehicle is the drone that \
-         flew, and that the mapping's columns, signs and scales are right",
-        unit,
+        "response: that of the vehicle in the hover is not that of the calibration's legs: {}. This is hardly the \
+         response of this drone, and its values are no measurement. See that --vehicle is the drone that flew, and \
+         that the mapping's columns, signs and scales are right",
         listed(&named)
     )
 }
