@@ -154,7 +154,7 @@ mod tests {
         let degrees = radians.map(f64::to_degrees);
         let said = steep(&flight(&degrees), "a").unwrap().to_string();
         assert!(
-            said.starts_with("angles: roll or pitch of a is beyond 45 degrees in 90 % of the rows"),
+            said.starts_with("angles: roll or pitch of a is beyond 45 degrees in 80 % of the rows"),
             "{said}"
         );
     }
