@@ -112,9 +112,11 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         Some(mapping) if flight.desired_up_mps.is_none() => steady(flight, &mapping.steps),
         _ => find_targets(flight, slot.map(|(_, segments)| segments), &mut warnings)?,
     };
-    if let Some(cause) = elsewhere(flight, &targets) {
+    let elsewhere = elsewhere(flight, &targets);
+    if let Some(cause @ Cause::EndsBefore { .. }) = elsewhere {
         return Err(cause);
     }
+    warnings.extend(elsewhere.clone().map(Warning::NothingOfPlan));
     let corrected = windows::correct_tilt(flight, &options.windows);
     let mut stats = windows::measure(flight, &corrected, &targets, &options.windows);
     let offset = options
@@ -145,12 +147,13 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let left = held_hover::end_where_left(flight, &mut of_air);
     let seen = Seen { flight, corrected: &corrected, targets: &of_air, windows: &stats };
     let measures = shared.planned_purpose != Some(Purpose::Calibration);
-    let mut updraft = match (input.level.filter(|_| measures), shared.map_reference) {
-        (None, None) => None,
-        (Some(level), _) => {
+    let mut updraft = match (input.level.filter(|_| measures), shared.map_reference, &elsewhere) {
+        (None, None, _) => None,
+        (_, _, Some(reason)) => Some(Err(reason.clone())),
+        (Some(level), ..) => {
             Some(levelled::measure(shared, level, flight, &of_air, (number, &name)))
         }
-        (None, Some(reference)) => Some(measure(shared, &seen, reference, number, &name)),
+        (None, Some(reference), None) => Some(measure(shared, &seen, reference, number, &name)),
     };
     if let Some(Ok((series, _))) = &mut updraft
         && let Some(measured) = &mut series.measured

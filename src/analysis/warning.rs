@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use super::calibrate::CalibrationError;
-use super::cause::later;
+use super::cause::{Cause, later};
 use super::caution::STEEP_DEG;
 use super::fit_warning::W_LIMIT_MPS;
 use super::ladder::{FEWEST_RUNGS, Ladder, PartialLadder};
@@ -20,6 +20,8 @@ const NAMED: usize = 8;
 pub enum Warning {
     /// A doubt about a drone's log.
     Log(flight::Warning),
+    /// Nothing of the plan is in a drone's log.
+    NothingOfPlan(Cause),
     /// The clock of a drone counts from its take-off.
     TakeoffClock,
     /// A drone's own law is of a part of the ladder, and the map takes the flock's.
@@ -175,6 +177,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Log(warning) => warning.fmt(f),
+            Self::NothingOfPlan(cause) => cause.fmt(f),
             Self::TakeoffClock => f.write_str(
                 "times count from take-off: windows may be shifted against the plan",
             ),
