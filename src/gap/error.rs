@@ -58,7 +58,7 @@ pub enum GapError {
         wrong: usize,
         /// Number of logs.
         of: usize,
-        /// What each of them flew instead.
+        /// Reasons of each of them, and the flight it holds instead.
         reasons: Vec<LeftOut>,
     },
     /// There is neither a plan nor logs of a simulation.

@@ -42,7 +42,7 @@ pub struct Next {
 }
 
 impl Next {
-    /// What the flight is, as a title: one that falls short tells most, and not enough.
+    /// Title of the flight: one that falls short tells most, and not enough.
     pub fn title(&self) -> &'static str {
         if self.reaches {
             "The flight that would tell"
