@@ -360,7 +360,7 @@ fn is_told(rows: &Rows, candidate: &Candidate) -> bool {
 }
 
 /// Whether the places that a thermal is seen from, as it drifts by, are at least as wide as its radius. What is wider than they
-/// are is a slope of any smooth field: three of 37 fleets of nine drones over 14 m found a thermal of 26 to 35 m in fields
+/// are is a slope of any smooth field: three of 40 fleets of nine drones over 14 m found a thermal of 26 to 35 m in fields
 /// that had none.
 fn is_spanned(rows: &Rows, candidate: &Candidate) -> bool {
     let shape = Shape::new(&candidate.numbers, candidate.at_s);
