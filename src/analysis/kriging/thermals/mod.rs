@@ -24,7 +24,7 @@ use super::scales::{
     COARSE, Extent, FINE, Family, Found, LN_GUST, LN_LENGTH, LN_SD, LN_SLOW, LN_TIME, Point,
     Search, Whole, log_prior,
 };
-use crate::numeric::{differences, minimise};
+use crate::numeric::{differences, extent, minimise};
 use fit::{Candidate, Fit, PEAK, Region, record};
 use shape::{DRIFT, DRIFT_MPS, PLACE, PLACE_M, SINK, Shape};
 use whiten::Whitening;
@@ -366,15 +366,11 @@ fn is_spanned(rows: &Rows, candidate: &Candidate) -> bool {
     let shape = Shape::new(&candidate.numbers, candidate.at_s);
     let places: Vec<[f64; 2]> =
         rows.list.iter().map(|row| shape.off_m(row.spot.place_m, row.spot.time_s)).collect();
+    let radius_m = shape.core_radius_m();
     (0..ACROSS).all(|step| {
         let (sin, cos) = (std::f64::consts::PI * step as f64 / ACROSS as f64).sin_cos();
-        let (least, most) = places
-            .iter()
-            .map(|[x, y]| x * cos + y * sin)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
-                (least.min(at), most.max(at))
-            });
-        most - least >= shape.core_radius_m()
+        let across = extent(places.iter().map(|[x, y]| x * cos + y * sin));
+        across.is_some_and(|(least, most)| most - least >= radius_m)
     })
 }
 
