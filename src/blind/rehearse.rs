@@ -15,6 +15,7 @@ use crate::effects::select::set;
 use crate::gap::Verdict;
 use crate::gap::next::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 use crate::gap::next::known::charge_of;
+use crate::gap::next::predict::z_of;
 use crate::gap::next::result::Verified;
 use crate::gap::next::{Elements, Question, Separation, Sought};
 use crate::gap::verdict::{Finding, Noise};
@@ -29,8 +30,6 @@ const LENGTH_M: f64 = 145.0;
 /// Cells and internal resistance of the batteries that the logs report.
 const CELLS: f64 = 3.0;
 const RESISTANCE_OHM: f64 = 0.03;
-/// Half of a 95 % interval, standard errors.
-const NORMAL: f64 = 1.96;
 
 /// A proposed flight with the air and noise to rehearse it in.
 #[derive(Clone, Copy, Debug)]
@@ -245,6 +244,5 @@ fn size_z(answer: &Answer, finding: &Finding) -> Option<f64> {
     };
     finding.effects().first().filter(|first| **first == answer.effect)?;
     let size = parameters.iter().find(|fitted| fitted.name == answer.parameter)?;
-    let se = (size.value.high - size.value.low) / (2.0 * NORMAL);
-    Some((size.value.value - size.before.unwrap_or(0.0)).abs() / se).filter(|z| z.is_finite())
+    Some(z_of(size.value, size.before.unwrap_or(0.0))).filter(|z| z.is_finite())
 }

@@ -6,19 +6,23 @@ use nalgebra::{DMatrix, DVector};
 use super::known::{Flight, Known};
 use super::questions::{Question, Sought};
 use super::scenery::Scenery;
+use crate::effects;
 use crate::gap::GapError;
 use crate::gap::candidates::{Updraft, one, set};
 use crate::gap::dependence::Dependence;
 use crate::gap::generic::{Generic, all};
 use crate::gap::gls::{Column, Solution, White};
+use crate::gap::refine::{fitted, half_interval, size_of, slopes};
 use crate::gap::refly::mean_drone;
-use crate::gap::verdict::Shape;
+use crate::gap::verdict::{Interval, Shape};
 use crate::numeric;
 use crate::vehicle::Vehicle;
 
 /// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s, as in the
 /// search.
 const MATTERS_US: f64 = 2.5;
+/// Half of a 95 % interval, standard errors.
+const NORMAL: f64 = 1.96;
 /// A new effect of more times its tried form is another effect, as the search has it.
 const MOST_TIMES: f64 = 5.0;
 
@@ -84,6 +88,44 @@ pub fn size_z(known: &Known, flight: &Flight, charge: bool, effect: &str) -> Res
     let scenery = Scenery::new(known, flight, charge, false)?;
     let seen = scenery.seen(&scenery.solution(Some(effect))?, effect)?;
     Ok(least(&seen))
+}
+
+/// The size of an effect over its standard error as a verdict will state it, if the flight tells it from nothing: by what the
+/// pulse changes at this size and not in proportion, with Student's law of the air and with the form that is not known
+/// better. `None`: steady flight does not show the effect.
+///
+/// # Errors
+/// As [`predict`].
+pub fn stated_z(
+    known: &Known,
+    flight: &Flight,
+    (charge, payload): (bool, bool),
+    effect: &str,
+    size: f64,
+) -> Result<Option<f64>, GapError> {
+    let Some(known_effect) = effects::find(effect) else { return Ok(None) };
+    let effects::Sought::Shape { size: name, .. } = known_effect.definition().sought else {
+        return Ok(None);
+    };
+    let Some(parameter) = size_of(effect, name) else { return Ok(None) };
+    let scenery = Scenery::new(known, flight, charge, payload)?;
+    let mut with = scenery.comparison.vehicle.clone();
+    set(&mut with, effect, name, size);
+    let own = std::slice::from_ref(&parameter);
+    let fitted_all = [&known.parameters[..], own].concat();
+    let solution = scenery.solution_of(&with, &known.parameters, &fitted_all)?;
+    let Some(slope) = scenery.regressors(slopes, &with, own)?.pop() else { return Ok(None) };
+    let se = solution.information(&solution.white(&slope)).max(0.0).sqrt().recip();
+    let half = half_interval(&scenery.comparison, &known.hyper);
+    let stated = fitted(own, &[(size, se)], half);
+    let z = stated.first().map(|one| z_of(one.value, 0.0));
+    Ok(z.filter(|z| z.is_finite()))
+}
+
+/// A value's distance from another in standard errors, by its 95 % interval.
+pub fn z_of(value: Interval, from: f64) -> f64 {
+    let se = (value.high - value.low) / (2.0 * NORMAL);
+    (value.value - from).abs() / se
 }
 
 /// Whether an effect of the usual size moves the pulse of this flight by as much as matters.

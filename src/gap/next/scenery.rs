@@ -18,7 +18,8 @@ use crate::mission::plan::Slot;
 use crate::vehicle::Vehicle;
 
 /// Regressors of a vehicle and its fitted sizes.
-type Regressors = fn(&Comparison, &Vehicle, &[Parameter]) -> Result<Vec<Column>, GapError>;
+pub(super) type Regressors =
+    fn(&Comparison, &Vehicle, &[Parameter]) -> Result<Vec<Column>, GapError>;
 
 /// A flight with its noise, ready to be asked.
 pub(super) struct Scenery<'a> {
@@ -125,32 +126,44 @@ impl<'a> Scenery<'a> {
 
     /// The noise, with all fitted sizes free but those of one effect, and with what the search will not know exactly.
     pub(super) fn solution(&self, but: Option<&str>) -> Result<Solution, GapError> {
-        let model = &self.known.model;
+        let is_free = |parameter: &&Parameter| Some(parameter.effect) != but;
+        let free: Vec<Parameter> = self.known.parameters.iter().filter(is_free).cloned().collect();
+        self.solution_of(&self.known.model, &free, &free)
+    }
+
+    /// The noise around a model, with what the search will not know exactly: sizes that are `free`, and the forms of all that
+    /// it fits.
+    pub(super) fn solution_of(
+        &self,
+        model: &Vehicle,
+        free: &[Parameter],
+        fitted: &[Parameter],
+    ) -> Result<Solution, GapError> {
         let gusts = gusts_mps(&self.known.hyper).min(MOST_GUSTS_MPS);
         let patterns = self.comparison.patterns(model, gusts)?;
         let split = Split::of(&self.comparison.residual(model, gusts)?);
-        let free: Vec<Parameter> = self
-            .known
-            .parameters
-            .iter()
-            .filter(|parameter| Some(parameter.effect) != but)
-            .cloned()
-            .collect();
-        let of = |regressors: Regressors| -> Result<Vec<Column>, GapError> {
-            let light = regressors(&self.comparison, model, &free)?;
-            let loaded = match self.loaded(model) {
-                Some(loaded) => regressors(&self.comparison, &loaded, &free)?,
-                None => Vec::new(),
-            };
-            // Who feels nothing has nothing to doubt, with a payload or without.
-            let both = loaded.len() == light.len();
-            let loaded =
-                loaded.into_iter().map(Some).filter(|_| both).chain(std::iter::repeat(None));
-            Ok(light.into_iter().zip(loaded).map(|(l, loaded)| self.merged(l, loaded)).collect())
-        };
-        let (columns, doubts) = (of(slopes)?, of(doubts)?);
+        let columns = self.regressors(slopes, model, free)?;
+        let doubts = self.regressors(doubts, model, fitted)?;
         let problem = Problem::new(&patterns, &split).doubting(&doubts);
         Ok(problem.with(&columns).at(&self.known.hyper))
+    }
+
+    /// Regressors of a model, each group's with its own weight.
+    pub(super) fn regressors(
+        &self,
+        of: Regressors,
+        model: &Vehicle,
+        parameters: &[Parameter],
+    ) -> Result<Vec<Column>, GapError> {
+        let light = of(&self.comparison, model, parameters)?;
+        let loaded = match self.loaded(model) {
+            Some(loaded) => of(&self.comparison, &loaded, parameters)?,
+            None => Vec::new(),
+        };
+        // Who feels nothing has nothing to doubt, with a payload or without.
+        let both = loaded.len() == light.len();
+        let loaded = loaded.into_iter().map(Some).filter(|_| both).chain(std::iter::repeat(None));
+        Ok(light.into_iter().zip(loaded).map(|(l, loaded)| self.merged(l, loaded)).collect())
     }
 
     /// An effect's forms, or a motion of the air, held against a vehicle.

@@ -11,7 +11,7 @@ use crate::blind::rehearse::{Rehearsal, answers, rehearse};
 use crate::campaign::{self, FlightFolder, to_json};
 use crate::effects::{LIBRARY, Signal};
 use crate::gap::Verdict;
-use crate::gap::next::predict::{least, matters};
+use crate::gap::next::predict::{least, matters, stated_z};
 use crate::gap::next::questions::Kind;
 use crate::gap::next::result::{Asked, Told};
 use crate::gap::next::search::{Aim, Choice, search};
@@ -131,6 +131,7 @@ pub(crate) fn run(host: &dyn Host, wish: &Wish) -> Result<Proposed, WorkflowErro
             host,
             &mut next,
             &Verify {
+                known: &known,
                 questions: &questions,
                 choice: &choice,
                 before: &before,
@@ -416,6 +417,7 @@ fn head(next: &Next) -> Vec<String> {
 }
 
 struct Verify<'a> {
+    known: &'a Known,
     questions: &'a [Question],
     choice: &'a Choice,
     before: &'a Before,
@@ -434,6 +436,8 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
         wind_mps: with.wind_mps,
         seed: with.seed,
     };
+    let flown = Flight::new(with.known, with.flight.plan.clone())?;
+    let brings = (with.choice.elements.charge, with.choice.elements.payload);
     let all = with.questions.iter().zip(&with.choice.predicted).zip(&mut next.questions);
     for ((question, predicted), asked) in all {
         let answers = answers(question, &with.before.model, predicted);
@@ -441,8 +445,13 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
             next.notes.push(format!("not simulated ({}): {why}", asked.question));
             continue;
         }
-        for answer in answers {
+        for mut answer in answers {
             host.check_stop()?;
+            if let Sought::Seen { effect } = &question.sought
+                && let Some(z) = stated_z(with.known, &flown, brings, effect, answer.size)?
+            {
+                answer.from = vec![(String::new(), z)];
+            }
             host.say(&format!("Simulating it with {} ...", answer.effect));
             let stop = Some(host.stop_flag());
             asked.verified.push(rehearse(&rehearsal, &answer, with.folder, &Searched, stop)?);
