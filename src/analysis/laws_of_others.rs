@@ -23,41 +23,85 @@ const SHARE: f64 = 0.5;
 /// that are alike nothing else is in the levels. Chosen: a quarter of their variance is then error.
 const BEYOND_ERRORS: f64 = 2.0;
 
+/// Nearest drones from whose mean a drone is told apart. Chosen: those beside it in a grid.
+const NEIGHBOURS: usize = 4;
+
+/// One drone: what its law says and what was measured with it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    /// The level of its law, as rising air, m/s, and the mean that was measured, m/s.
+    pair: (f64, f64),
+    /// Standard error of the level, m/s.
+    error_mps: f64,
+    /// East and north of the site, m; absent: not known.
+    place_m: Option<[f64; 2]>,
+}
+
 /// That the laws of a calibration seem to be those of other drones than the map's.
 pub(super) fn doubt(map: &UpdraftMap, calibration: &FlightAnalysis) -> Option<Warning> {
     let slope = calibration.flock.as_ref()?.linear.as_ref()?.parameters.first()?.estimate.value;
-    let (pairs, errors): (Vec<(f64, f64)>, Vec<f64>) = map
+    let seen: Vec<Seen> = map
         .drones
         .iter()
         .filter(|drone| drone.mapping == LawOf::Own)
         .filter_map(|drone| {
             let calibrated = same_drone(calibration, drone.slot, &drone.name)?;
             let level = calibrated.laws.as_ref()?.linear.as_ref()?.parameters.get(1)?.estimate;
-            Some(((level.value / slope, drone.mean.value), level.se / slope))
+            let pair = (level.value / slope, drone.mean.value);
+            Some(Seen { pair, error_mps: level.se / slope, place_m: drone.position_m })
         })
-        .filter(|((level_mps, mean_mps), _)| level_mps.is_finite() && mean_mps.is_finite())
-        .unzip();
-    depends(&pairs, &errors).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
-        drones: pairs.len(),
+        .filter(|seen| seen.pair.0.is_finite() && seen.pair.1.is_finite())
+        .collect();
+    depends(&apart(&seen)).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
+        drones: seen.len(),
         correlation,
         spread_mps,
     })
 }
 
+/// Drones apart from the mean of those nearest to them, with the spread that they would have had with none beside them. Air
+/// that lasts through a calibration differs from one end of the array to the other, and is then in the levels of laws that
+/// are the drones' own; laws differ from drone to drone. As they are where a place is not known, or with few drones.
+fn apart(seen: &[Seen]) -> Vec<Seen> {
+    let places: Option<Vec<[f64; 2]>> = seen.iter().map(|one| one.place_m).collect();
+    let Some(places) = places.filter(|places| places.len() > NEIGHBOURS) else {
+        return seen.to_vec();
+    };
+    let narrower = (1.0 + 1.0 / NEIGHBOURS as f64).sqrt();
+    let others_mean = |of: usize| {
+        let distance =
+            |to: usize| (places[to][0] - places[of][0]).hypot(places[to][1] - places[of][1]);
+        let mut others: Vec<(f64, usize)> =
+            (0..seen.len()).filter(|to| *to != of).map(|to| (distance(to), to)).collect();
+        others
+            .select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let near = others.iter().take(NEIGHBOURS).map(|(_, other)| seen[*other].pair);
+        let sum = near.fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+        (sum.0 / NEIGHBOURS as f64, sum.1 / NEIGHBOURS as f64)
+    };
+    let one = |(at, one): (usize, &Seen)| {
+        let mean = others_mean(at);
+        let pair = ((one.pair.0 - mean.0) / narrower, (one.pair.1 - mean.1) / narrower);
+        Seen { pair, ..*one }
+    };
+    seen.iter().enumerate().map(one).collect()
+}
+
 /// Correlation of the levels with the means that were measured, both in m/s, and the standard deviation of the levels;
 /// `None` as long as they may be independent, or the levels' errors (m/s) be all that they differ by.
-fn depends(pairs: &[(f64, f64)], errors: &[f64]) -> Option<(f64, f64)> {
-    if pairs.len() < FEWEST {
+fn depends(seen: &[Seen]) -> Option<(f64, f64)> {
+    if seen.len() < FEWEST {
         return None;
     }
-    let line = Line::through(pairs.iter().copied())?;
+    let line = Line::through(seen.iter().map(|one| one.pair))?;
     let correlation = line.correlation()?;
-    let freedom = (pairs.len() - 2) as f64;
+    let freedom = (seen.len() - 2) as f64;
     let t = correlation * (freedom / (1.0 - correlation * correlation).max(1e-12)).sqrt();
     let chance = StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
     let centre_mps = line.mean[0];
-    let spread_mps = rms(pairs.iter().map(|pair| pair.0 - centre_mps))?;
-    let error_mps = rms(errors.iter().copied().filter(|se| se.is_finite())).unwrap_or(0.0);
+    let spread_mps = rms(seen.iter().map(|one| one.pair.0 - centre_mps))?;
+    let error_mps =
+        rms(seen.iter().map(|one| one.error_mps).filter(|se| se.is_finite())).unwrap_or(0.0);
     let is_beyond = spread_mps > BEYOND_ERRORS * error_mps;
     (is_beyond && chance < CHANCE && line.slope() > SHARE).then_some((correlation, spread_mps))
 }
@@ -68,6 +112,12 @@ mod tests {
 
     use super::*;
 
+    /// A drone in a grid of this side, 7 m apart.
+    fn at(drone: usize, side: usize, pair: (f64, f64), error_mps: f64) -> Seen {
+        let place_m = [7.0 * (drone % side) as f64, 7.0 * (drone / side) as f64];
+        Seen { pair, error_mps, place_m: Some(place_m) }
+    }
+
     /// Share of fleets that are doubted, whose levels differ by 0.4 m/s and the air from place to place by `air_mps`.
     fn doubted(drones: usize, air_mps: f64, own: bool) -> f64 {
         let mut rng = rand_pcg::Pcg64::new(5, 7);
@@ -77,14 +127,15 @@ mod tests {
         };
         let fleets = 1000;
         let found = (0..fleets).filter(|_| {
-            let pairs: Vec<(f64, f64)> = (0..drones)
-                .map(|_| {
+            let side = (drones as f64).sqrt().ceil() as usize;
+            let seen: Vec<Seen> = (0..drones)
+                .map(|drone| {
                     let (level, error, other) = (draw(0.4), draw(0.03), draw(0.4));
                     let off = if own { error } else { level - other };
-                    (level, draw(air_mps) + off)
+                    at(drone, side, (level, draw(air_mps) + off), 0.03)
                 })
                 .collect();
-            depends(&pairs, &vec![0.03; drones]).is_some()
+            depends(&apart(&seen)).is_some()
         });
         found.count() as f64 / f64::from(fleets)
     }
@@ -105,9 +156,30 @@ mod tests {
     #[test]
     fn levels_that_differ_by_their_errors_alone_doubt_nobody() {
         // Of drones that are alike: what a level is off by is in all that is measured by it.
-        let pairs: Vec<(f64, f64)> =
-            (0..16).map(|at| 0.01 * f64::from(at)).map(|level| (level, level)).collect();
-        assert!(depends(&pairs, &[0.08; 16]).is_none());
-        assert!(depends(&pairs, &[0.01; 16]).is_some());
+        let doubted = |error_mps: f64| {
+            let level = |drone: usize| 0.01 * drone as f64;
+            let seen: Vec<Seen> = (0..16)
+                .map(|drone| at(drone, 4, (level(drone), level(drone)), error_mps))
+                .collect();
+            depends(&seen)
+        };
+        assert!(doubted(0.08).is_none());
+        assert!(doubted(0.01).is_some());
+    }
+
+    #[test]
+    fn air_that_lasts_through_a_calibration_is_in_the_levels_of_own_laws() {
+        // From one end of 63 m to the other the level of drones that are alike differs by the air's 0.3 m/s.
+        let mut rng = rand_pcg::Pcg64::new(5, 7);
+        let seen: Vec<Seen> = (0..100)
+            .map(|drone| {
+                let error: f64 = StandardNormal.sample(&mut rng);
+                let lasting = 0.15 * (0.045 * 7.0 * (drone % 10) as f64).cos();
+                let level = lasting + 0.03 * error;
+                at(drone, 10, (level, level), 0.03)
+            })
+            .collect();
+        assert!(depends(&seen).is_some(), "by the levels as they are");
+        assert!(depends(&apart(&seen)).is_none());
     }
 }
