@@ -210,8 +210,6 @@ impl HiddenKind {
             };
             parameters.insert((*name).to_owned(), value);
         }
-        let per_thrust = Reference::of(&known).sensitivity_us();
-        let pulse = |size: f64, at: &Signals| self.pulse_us(&known, size, at);
         let value = match self.magnitude {
             Magnitude::Value => magnitude,
             Magnitude::EitherSign => sign * magnitude,
@@ -223,22 +221,8 @@ impl HiddenKind {
                     magnitude
                 }
             }
-            Magnitude::HoverSlope => {
-                let slope = |share| {
-                    let at = |climb_mps| Signals { climb_mps, ..Signals::default() };
-                    Ok((pulse(share, &at(1.0))? - pulse(share, &at(-1.0))?) / 2.0)
-                };
-                self.share_for(size, &mut magnitude, slope)?
-            }
-            Magnitude::GainIn(horizontal_mps) => {
-                let at = Signals { horizontal_mps, ..Signals::default() };
-                let gain = |share| Ok(-pulse(share, &at)? / per_thrust);
-                self.share_for(size, &mut magnitude, gain)?
-            }
-            Magnitude::LossAt(climb_mps) => {
-                let at = Signals { climb_mps, ..Signals::default() };
-                let loss = |share| Ok(pulse(share, &at)? / per_thrust);
-                self.share_for(size, &mut magnitude, loss)?
+            Magnitude::HoverSlope | Magnitude::GainIn(_) | Magnitude::LossAt(_) => {
+                self.share_for(size, &mut magnitude, |share| self.magnitude_of(&known, share))?
             }
             Magnitude::KnownDrag => {
                 let [top_m2, side_m2] = match Role::BodyDragTop.value(&known) {
@@ -278,6 +262,51 @@ impl HiddenKind {
             }
             _ => format!("{magnitude:.3} {}", self.unit),
         }
+    }
+
+    /// Magnitude of a share of the inflow on a vehicle, in [`HiddenKind::unit`]; of other parameters it is the value itself.
+    fn magnitude_of(&self, known: &Vehicle, size: f64) -> Result<f64, BlindError> {
+        let per_thrust = Reference::of(known).sensitivity_us();
+        let pulse = |at: &Signals| self.pulse_us(known, size, at);
+        let climbing = |climb_mps| Signals { climb_mps, ..Signals::default() };
+        Ok(match self.magnitude {
+            Magnitude::HoverSlope => (pulse(&climbing(1.0))? - pulse(&climbing(-1.0))?) / 2.0,
+            Magnitude::GainIn(horizontal_mps) => {
+                -pulse(&Signals { horizontal_mps, ..Signals::default() })? / per_thrust
+            }
+            Magnitude::LossAt(climb_mps) => pulse(&climbing(climb_mps))? / per_thrust,
+            _ => size,
+        })
+    }
+
+    /// The size that does as much in the form in which the effect was hidden as `size` does in another `form`, a parameter with
+    /// its value; `None`: it is the same form, or sizes do not depend on it.
+    pub(super) fn as_large(
+        &self,
+        known: &Vehicle,
+        form: (&str, f64),
+        hidden: &Hidden,
+        size: f64,
+    ) -> Option<f64> {
+        let is_share = matches!(
+            self.magnitude,
+            Magnitude::HoverSlope | Magnitude::GainIn(_) | Magnitude::LossAt(_)
+        );
+        let parameter = find(self.effect)?.definition().parameter(form.0).filter(|_| is_share)?;
+        let own = value_of(known, self.effect, form.0);
+        let true_form = hidden.parameters.get(form.0).copied().or(own);
+        let true_form = true_form.unwrap_or_else(|| (parameter.default)(known));
+        if true_form == form.1 {
+            return None;
+        }
+        let with = |value: f64| {
+            let mut vehicle = known.clone();
+            set(&mut vehicle, self.effect, form.0, value);
+            vehicle
+        };
+        let magnitude = self.magnitude_of(&with(form.1), size).ok()?;
+        let in_true_form = with(true_form);
+        share_of(magnitude, (0.0, 1.0), |share| self.magnitude_of(&in_true_form, share)).ok()
     }
 
     /// Pulse of the effect on a vehicle when its size is this, us.
@@ -324,13 +353,21 @@ impl HiddenKind {
             let place = (*magnitude / low).ln() / (high / low).ln();
             *magnitude = low * (most.max(low) / low).powf(place);
         }
-        let (mut below, mut above) = (LEAST_SHARE, MOST_SHARE);
-        for _ in 0..60 {
-            let middle = f64::midpoint(below, above);
-            if size(middle)? < *magnitude { below = middle } else { above = middle }
-        }
-        Ok(f64::midpoint(below, above))
+        share_of(*magnitude, (LEAST_SHARE, MOST_SHARE), size)
     }
+}
+
+/// The share of inflow between two that has a magnitude; the nearer end, if none has.
+fn share_of(
+    magnitude: f64,
+    (mut below, mut above): (f64, f64),
+    size: impl Fn(f64) -> Result<f64, BlindError>,
+) -> Result<f64, BlindError> {
+    for _ in 0..60 {
+        let middle = f64::midpoint(below, above);
+        if size(middle)? < magnitude { below = middle } else { above = middle }
+    }
+    Ok(f64::midpoint(below, above))
 }
 
 /// Drag of an airframe as drag coefficient times area, from above and from the side, m²: that of AirSim's

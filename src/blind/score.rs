@@ -5,12 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use super::classes::{equivalent, is_single};
 use super::foreign;
-use super::hide::Hidden;
+use super::hide::{Hidden, kind_of};
 use super::scenario::{Cell, Scenario};
 use super::tables::ALIKE;
 use crate::effects::{Effect, Role, find};
-use crate::gap::verdict::{Finding, Fitted, Interval};
+use crate::gap::verdict::{Finding, Fitted, Form, Interval};
 use crate::gap::{Dependence, Verdict};
+use crate::vehicle::Vehicle;
 
 /// A gap that grows by less is the same: a bias of the velocity shifts a straight response as a whole, and
 /// its repair leaves the gap as it was but for rounding.
@@ -50,7 +51,7 @@ pub struct HiddenOutcome {
     pub called: Called,
     /// True value of the parameter that says how large it is.
     pub value: f64,
-    /// The fitted one.
+    /// The fitted one, in the form of the effect that was hidden.
     pub fitted: Option<f64>,
     /// Error of the fitted change over the true change, signed.
     pub relative_error: Option<f64>,
@@ -104,7 +105,8 @@ impl Outcome {
 pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> Outcome {
     let hidden = truth.hidden.iter().enumerate().map(|(index, hidden)| {
         let z = fisher_z.get(index).copied().flatten();
-        compare(hidden, truth.fleet_value(hidden), verdict, z)
+        let known = truth.cell.base.known().ok();
+        compare(hidden, truth.fleet_value(hidden), known.as_ref(), verdict, z)
     });
     let mut outcome = Outcome {
         seed: truth.seed,
@@ -195,9 +197,15 @@ fn is_alike(hidden: &Hidden, effect: &str) -> bool {
     hidden.foreign && ALIKE.contains(&(hidden.effect.as_str(), effect))
 }
 
-fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
+fn compare(
+    hidden: &Hidden,
+    value: f64,
+    known: Option<&Vehicle>,
+    verdict: &Verdict,
+    z: Option<f64>,
+) -> HiddenOutcome {
     let called = called(hidden, verdict);
-    let fitted = fitted(hidden, verdict);
+    let fitted = fitted(hidden, known, verdict);
     // What is estimated is the change against the model that was held against the logs.
     let before = hidden.before.unwrap_or(0.0);
     let change = value - before;
@@ -247,8 +255,9 @@ fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
     best
 }
 
-/// The fitted value of the parameter that says how large a hidden effect is.
-fn fitted(hidden: &Hidden, verdict: &Verdict) -> Option<Interval> {
+/// The fitted value of the parameter that says how large a hidden effect is: where it was found in another of its forms, the
+/// size that does as much in the true one.
+fn fitted(hidden: &Hidden, known: Option<&Vehicle>, verdict: &Verdict) -> Option<Interval> {
     if hidden.foreign {
         return None;
     }
@@ -266,13 +275,31 @@ fn fitted(hidden: &Hidden, verdict: &Verdict) -> Option<Interval> {
         found.map(|fitted| fitted.value)
     };
     // The last step that has it: later steps fit everything again.
-    verdict.steps.iter().rev().find_map(|step| match &step.finding {
-        Finding::Name { effect, parameters, .. } if *effect == hidden.effect => of(parameters),
-        Finding::Class { effects, parameters } if effects.first() == Some(&hidden.effect) => {
-            of(parameters)
-        }
-        _ => None,
+    verdict.steps.iter().rev().find_map(|step| {
+        let found = match &step.finding {
+            Finding::Name { effect, parameters, .. } if *effect == hidden.effect => of(parameters),
+            Finding::Class { effects, parameters } if effects.first() == Some(&hidden.effect) => {
+                of(parameters)
+            }
+            _ => None,
+        }?;
+        Some(step.form.as_ref().map_or(found, |form| in_true_form(found, form, hidden, known)))
     })
+}
+
+/// A size that was found with a form, as that which does as much in the form that was hidden.
+fn in_true_form(
+    found: Interval,
+    form: &Form,
+    hidden: &Hidden,
+    known: Option<&Vehicle>,
+) -> Interval {
+    let (Some(known), Ok(kind)) = (known, kind_of(&hidden.kind)) else { return found };
+    let as_true = |size| kind.as_large(known, (&form.name, form.value), hidden, size);
+    match (as_true(found.value), as_true(found.low), as_true(found.high)) {
+        (Some(value), Some(low), Some(high)) => Interval { value, low, high },
+        _ => found,
+    }
 }
 
 /// Whether a verdict says that the flight shows a hidden effect at its true size.

@@ -1,6 +1,6 @@
 //! Power of a flight: the smallest size of each effect that it would have named.
 
-use super::candidates::{Candidate, Updraft, library};
+use super::candidates::{Candidate, Updraft, Variant, library};
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Column, Problem, Solution, Split, White};
@@ -8,7 +8,8 @@ use super::refine::{doubts, slopes};
 use super::response::shifted;
 use super::search::FLOOR_NATS;
 use super::verdict::Detectable;
-use crate::effects::{LIBRARY, Sought};
+use crate::effects::{LIBRARY, Sought, find};
+use crate::vehicle::Vehicle;
 
 /// Fisher z from which an effect counts as found nearly always: Phi(5 - 4) = 84 % (docs/physics.md, 3.3).
 const SEEN_Z: f64 = 5.0;
@@ -47,7 +48,8 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
         .map(|candidate| {
             let is_found = found.parameters.iter().any(|one| one.effect == candidate.name);
             let own = is_found.then(|| free_but(Some(candidate.name)));
-            (candidate, strongest(candidate, own.as_ref().unwrap_or(&solution), &drones))
+            let form = usual_form(candidate.name, &found.vehicle);
+            (candidate, strongest(candidate, form, own.as_ref().unwrap_or(&solution), &drones))
         })
         .collect();
     let mut table = Vec::new();
@@ -113,13 +115,29 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
 /// A form whitened, its z and its trace (us) per unit of the size.
 type Trace = (White, f64, f64);
 
-/// The form of a candidate that the flight shows best: whitened, its z and its trace (us) per unit of
-/// the size.
-fn strongest(candidate: &Candidate, solution: &Solution, drones: &[usize]) -> Option<Trace> {
+/// The form in which a vehicle has an effect if nothing else is said, of those that are tried; `None`: it has one.
+fn usual_form(effect: &str, vehicle: &Vehicle) -> Option<f64> {
+    let definition = find(effect)?.definition();
+    let Sought::Shape { shape: Some((name, forms)), .. } = &definition.sought else { return None };
+    let usual = (definition.parameter(name)?.default)(vehicle);
+    forms.iter().copied().min_by(|a, b| (a - usual).abs().total_cmp(&(b - usual).abs()))
+}
+
+/// How a flight shows a candidate best in this form, whitened, its z and its trace (us) per unit of the size. Of another form the
+/// flight may show more, or nothing: a vortex ring that begins in a slower descent is met where that of the usual onset is not.
+fn strongest(
+    candidate: &Candidate,
+    form: Option<f64>,
+    solution: &Solution,
+    drones: &[usize],
+) -> Option<Trace> {
     let now = candidate.size.map_or(0.0, |size| size.now);
+    let is_usual = |variant: &&Variant| form.is_none() || variant.form == form;
+    let has_usual = candidate.variants.iter().any(|variant| is_usual(&variant));
     candidate
         .variants
         .iter()
+        .filter(|variant| !has_usual || is_usual(variant))
         .map(|variant| {
             let white = solution.white(&variant.column);
             let by = (variant.size - now).abs().max(1e-12);

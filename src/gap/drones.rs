@@ -201,6 +201,7 @@ fn spread(
         rivals: Vec::new(),
         shape: None,
         in_field: None,
+        form: None,
     })
 }
 

@@ -1,6 +1,6 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
-mod form;
+pub(super) mod form;
 mod in_updraft;
 mod look;
 mod telling;
@@ -494,6 +494,7 @@ impl Search<'_> {
             rivals,
             shape: Some(along_its_signal(comparison, variant, best.beta)),
             in_field: None,
+            form: None,
         });
         Ok(())
     }
@@ -524,6 +525,7 @@ impl Search<'_> {
             rivals,
             shape: Some(shape),
             in_field: None,
+            form: None,
         });
     }
 

@@ -162,6 +162,7 @@ mod tests {
             rivals: Vec::new(),
             shape: None,
             in_field: None,
+            form: None,
         }];
         tell(&mut found, &original).unwrap();
         let told = found.steps[0].in_field.unwrap();

@@ -124,6 +124,7 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         rivals: Vec::new(),
         shape: None,
         in_field: None,
+        form: None,
     })
 }
 

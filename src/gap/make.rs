@@ -168,6 +168,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         super::explain::settle(&mut found);
     }
     super::in_field::tell(&mut found, vehicle)?;
+    super::explain::form::tell(&mut found.steps, &found.vehicle);
     // The map of disagreement is drawn in the air that was found.
     let before = if updraft_mps == 0.0 {
         before

@@ -132,6 +132,7 @@ pub(super) fn step(finding: Finding, gain_nats: f64, rivals: &[(&str, f64)]) -> 
         rivals: rivals.iter().map(rival).collect(),
         shape: None,
         in_field: None,
+        form: None,
     }
 }
 

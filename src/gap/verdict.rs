@@ -136,6 +136,21 @@ pub struct Step {
     /// Its size in units of the field; absent: it is no effect in the model.
     #[serde(default)]
     pub in_field: Option<InField>,
+    /// Which of two forms the effect has in the model; absent: there is one.
+    #[serde(default)]
+    pub form: Option<Form>,
+}
+
+/// The parameter that says which of two forms an effect has: its size is that of this form.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Form {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Whether that is the one of a vehicle's file that states none.
+    pub is_usual: bool,
 }
 
 /// The size of an effect in units of the field: of its change, where the model had it.

@@ -9,6 +9,7 @@ use super::verdict::{Gap, is_strong_wind};
 use super::words::short;
 use crate::base::said::said_in_files;
 use crate::effects::select::value_of;
+use crate::mission::plan::{Group, Plan};
 
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
@@ -65,6 +66,15 @@ pub enum Warning {
     Tables,
     /// All drones climb at the same time.
     OneGroup,
+    /// None of the drones of a group gave a usable log.
+    GroupLost {
+        /// Name of the group in the plan.
+        group: String,
+        /// Number of its drones in the plan.
+        planned: usize,
+        /// Number of groups that are compared.
+        left: usize,
+    },
     /// The logs have no battery voltage at rest.
     NoRestingVoltage,
     /// The model that stands for another program's simulation has another drag of its body than its file.
@@ -152,6 +162,18 @@ impl fmt::Display for Warning {
                 "all drones climb at the same time: what depends on climb speed is mixed with the \
                  shared air (calibration-counterphase tells them apart)",
             ),
+            Self::GroupLost { group, planned, left } => {
+                write!(
+                    f,
+                    "none of the {planned} drones of group {group} gave a usable log: "
+                )?;
+                f.write_str(if *left == 1 {
+                    "the others climb at the same time, and what depends on climb speed is mixed with the \
+                     shared air"
+                } else {
+                    "what the groups tell apart, the others tell less surely"
+                })
+            }
             Self::NoRestingVoltage => f.write_str(
                 "the logs have no voltage at rest (BAT.VoltR): battery sag is looked for by time alone",
             ),
@@ -214,13 +236,29 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
     if input.table.is_some() {
         warnings.push(Warning::Tables);
     }
-    if data.groups.len() == 1 && input.plan.is_some() && input.simulated.is_none() {
-        warnings.push(Warning::OneGroup);
+    if let Some(plan) = input.plan {
+        let lost = groups_lost(plan, data);
+        if lost.is_empty() && data.groups.len() == 1 && input.simulated.is_none() {
+            warnings.push(Warning::OneGroup);
+        }
+        warnings.extend(lost);
     }
     if found.comparison.scene.volts.is_none() {
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// Groups of a plan of which no drone is compared.
+fn groups_lost(plan: &Plan, data: &Data) -> Vec<Warning> {
+    let is_lost = |group: &&Group| data.groups.iter().all(|one| one.name != group.name);
+    let lost = plan.groups.iter().enumerate().filter(|(_, group)| is_lost(group));
+    lost.filter_map(|(index, group)| {
+        let planned = plan.slots.iter().filter(|slot| usize::from(slot.group) == index).count();
+        let group = group.name.clone();
+        (planned > 0).then_some(Warning::GroupLost { group, planned, left: data.groups.len() })
+    })
+    .collect()
 }
 
 #[cfg(test)]

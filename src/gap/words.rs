@@ -4,16 +4,17 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use super::dependence::Dependence;
-use super::verdict::{Finding, Fitted, Step, Verdict, is_strong_wind};
+use super::verdict::{Finding, Fitted, Form, Step, Verdict, is_strong_wind};
 use super::warning::Warning;
 use crate::effects::Role;
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
-pub fn phrase(finding: &Finding) -> String {
-    match finding {
+pub fn phrase(step: &Step) -> String {
+    let form = step.form.as_ref();
+    match &step.finding {
         Finding::Name { effect, parameters, was_there } => {
             let again = if *was_there { ", with another size than the model's" } else { "" };
-            format!("{effect}{}{again}", values(parameters))
+            format!("{effect}{}{again}", values(parameters, form))
         }
         Finding::Class { effects, parameters } => format!(
             "{}: this flight cannot separate them{}",
@@ -21,7 +22,7 @@ pub fn phrase(finding: &Finding) -> String {
             if parameters.is_empty() {
                 String::new()
             } else {
-                format!(" (as {}{})", effects[0], values(parameters))
+                format!(" (as {}{})", effects[0], values(parameters, form))
             }
         ),
         Finding::Unknown { depends_on, formula } => {
@@ -71,7 +72,7 @@ fn either(names: &[Cow<'_, str>]) -> String {
     }
 }
 
-fn values(parameters: &[Fitted]) -> String {
+fn values(parameters: &[Fitted], form: Option<&Form>) -> String {
     let one = |fitted: &Fitted| {
         let unit = if fitted.unit.is_empty() { String::new() } else { format!(" {}", fitted.unit) };
         let before = fitted
@@ -88,7 +89,10 @@ fn values(parameters: &[Fitted]) -> String {
     if parameters.is_empty() {
         return String::new();
     }
-    format!(" ({})", parameters.iter().map(one).collect::<Vec<_>>().join("; "))
+    let of_form = form.filter(|form| !form.is_usual).map_or_else(String::new, |form| {
+        format!("; of the form with {} {}", form.name, short(form.value))
+    });
+    format!(" ({}{of_form})", parameters.iter().map(one).collect::<Vec<_>>().join("; "))
 }
 
 /// A number with three significant digits.
@@ -139,8 +143,7 @@ pub fn summary(verdict: &Verdict) -> String {
             would
         )
     } else {
-        let named: Vec<String> =
-            verdict.steps.iter().map(|step: &Step| phrase(&step.finding)).collect();
+        let named: Vec<String> = verdict.steps.iter().map(phrase).collect();
         format!("The model lacks {}.", named.join("; and "))
     };
     if verdict.sensor.named {

@@ -106,7 +106,7 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
         kind => kind(&found.finding),
         heading => heading(&found.finding),
         sentence => what_it_means(&found.finding),
-        phrase => micro(&capitalised(&phrase(&found.finding))),
+        phrase => micro(&capitalised(&phrase(found))),
         effects,
         parameters => parameters,
         gain => fixed(found.gain_nats, 1),

@@ -112,7 +112,7 @@ fn data(verdict: &Verdict) -> String {
 fn say_step(page: &mut Page, number: usize, step: &Step) {
     page.line("", "");
     let what = kind(&step.finding);
-    page.say(BOLD, &format!("Step {number}, {what}: {}", phrase(&step.finding)), 2);
+    page.say(BOLD, &format!("Step {number}, {what}: {}", phrase(step)), 2);
     page.say(
         "",
         &format!(

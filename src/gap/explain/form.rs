@@ -2,6 +2,7 @@
 
 use super::super::candidates::{form_price_nats, set};
 use super::super::error::GapError;
+use super::super::verdict::{Form, Step};
 use super::Search;
 use crate::effects::select::value_of;
 use crate::effects::{Definition, Parameter, Role, Sought, find};
@@ -38,15 +39,30 @@ impl Search<'_> {
     }
 }
 
+/// Writes into each step which of two forms its effect has in the model.
+pub(in super::super) fn tell(steps: &mut [Step], model: &Vehicle) {
+    for step in steps {
+        let effect = step.finding.effects().first().and_then(|name| find(name));
+        step.form = effect.and_then(|effect| {
+            let definition = effect.definition();
+            let (form, _) = forms(definition)?;
+            let value = value_of(model, definition.name, form.name)?;
+            let is_usual = value == (form.default)(model);
+            Some(Form { name: form.name.to_owned(), value, is_usual })
+        });
+    }
+}
+
+/// The parameter by which the search chooses between forms of an effect, and its values.
+fn forms(definition: &Definition) -> Option<(&Parameter, &[f64])> {
+    let Sought::Shape { shape: Some((name, values)), .. } = &definition.sought else { return None };
+    let form = definition.parameter(name)?;
+    form.role.is_some_and(Role::is_choice).then_some((form, *values))
+}
+
 /// The forms of an effect that a vehicle's has not, where they are a choice.
 fn others<'a>(definition: &'a Definition, vehicle: &Vehicle) -> Vec<(&'a Parameter, f64)> {
-    let Sought::Shape { shape: Some((name, values)), .. } = &definition.sought else {
-        return Vec::new();
-    };
-    let is_choice = |role: Option<Role>| role.is_some_and(Role::is_choice);
-    let Some(form) = definition.parameter(name).filter(|form| is_choice(form.role)) else {
-        return Vec::new();
-    };
+    let Some((form, values)) = forms(definition) else { return Vec::new() };
     let now = value_of(vehicle, definition.name, form.name);
     values.iter().filter(|value| now != Some(**value)).map(|value| (form, *value)).collect()
 }

@@ -15,7 +15,7 @@ use updraft::blind::told::{is_right, words};
 use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario, Worlds};
 use updraft::blind::{seal, series};
 use updraft::gap::verdict::{
-    Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
+    Detectable, Finding, Fitted, Form, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
 };
 use updraft::gap::{Dependence, Verdict};
 
@@ -36,6 +36,7 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         rivals: Vec::new(),
         shape: None,
         in_field: None,
+        form: None,
     };
     Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
@@ -84,6 +85,24 @@ fn the_right_name_with_its_parameter() {
     assert!(outcome.wrong_names.is_empty() && !outcome.is_false_alarm());
     let far = score(&truth, &named(1.5), &[]);
     assert_eq!((far.hidden[0].covered, far.hidden[0].z), (Some(false), None));
+}
+
+#[test]
+fn sizes_are_those_of_the_form_that_was_hidden() {
+    let mut truth = truth(Base::Airsim, &["rotor-inflow"]);
+    // 18 us per m/s at hover, as a share with momentum theory's change of the induced velocity and without.
+    truth.hidden[0].parameters.insert("inflow_share".to_owned(), 0.263);
+    let mut found = verdict(vec![name("rotor-inflow", "inflow_share", around(0.134, 0.01))]);
+    let covered = |verdict: &Verdict| score(&truth, verdict, &[]).hidden[0].covered;
+    assert_eq!(covered(&found), Some(false));
+    for (value, is_covered) in [(1.0, false), (0.0, true)] {
+        found.steps[0].form =
+            Some(Form { name: "induced".to_owned(), value, is_usual: value == 1.0 });
+        assert_eq!(covered(&found), Some(is_covered));
+    }
+    let hidden = &score(&truth, &found, &[]).hidden[0];
+    assert!((hidden.fitted.unwrap() - 0.263).abs() < 0.005, "{hidden:?}");
+    assert!(hidden.relative_error.unwrap().abs() < 0.02, "{hidden:?}");
 }
 
 #[test]

@@ -247,6 +247,20 @@ fn a_half_fleet_that_lost_a_log_is_compared() {
     let data = &ended.json("updraft.gap/1")["verdict"]["data"];
     assert_eq!(data["drones"], 14);
     assert!(data["held_out"].as_array().is_some_and(|held| held.len() == 3), "{data}");
+
+    let plan = fs::read(bench.path("campaign/plan.json")).unwrap();
+    let plan: serde_json::Value = serde_json::from_slice(&plan).unwrap();
+    let slots = plan["slots"].as_array().unwrap();
+    for slot in slots.iter().filter(|slot| slot["group"] == slots[1]["group"] && slot["slot"] != 2)
+    {
+        let number = slot["slot"].as_u64().unwrap();
+        fs::remove_file(bench.path(&format!("campaign/simulated/{number:02}.BIN"))).unwrap();
+    }
+    let ended = bench.expect(0, &["gap", "campaign", "--json"]);
+    let cautions = ended.json("updraft.gap/1")["verdict"]["cautions"].to_string();
+    assert!(cautions.contains("of the 7 drones of group"), "{cautions}");
+    assert!(cautions.contains("the others climb at the same time"), "{cautions}");
+    assert!(!cautions.contains("all drones climb"), "{cautions}");
 }
 
 /// Climbs of the ladder in a table.

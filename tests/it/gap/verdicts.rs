@@ -51,6 +51,7 @@ pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
         rivals: Vec::new(),
         shape: None,
         in_field: None,
+        form: None,
     };
     Verdict {
         schema: VERDICT_SCHEMA.to_owned(),

@@ -35,6 +35,7 @@ fn step(finding: Finding, gain_nats: f64, rivals: Vec<Rival>) -> Step {
         rivals,
         shape: Some(Shape { axis: "vertical velocity (m/s)".to_owned(), x, us }),
         in_field: None,
+        form: None,
     }
 }
 

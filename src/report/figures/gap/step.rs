@@ -232,6 +232,7 @@ mod tests {
             rivals: vec![rival("face-drag", false, 10.1), rival("battery", false, 9.0)],
             shape: None,
             in_field: None,
+            form: None,
         };
         assert_eq!(gain_nats(&step, &step.rivals[0]), 36.8);
         assert_eq!(gain_nats(&step, &step.rivals[1]), 9.0);
