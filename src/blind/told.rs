@@ -8,7 +8,7 @@ use super::play::Played;
 use super::score::{Called, HiddenOutcome, Outcome};
 use crate::effects::{Role, find};
 use crate::gap::Verdict;
-use crate::gap::verdict::Shrink;
+use crate::gap::verdict::{Finding, Shrink};
 use crate::gap::words::short;
 
 /// Name and version of the format of `hidden.json`.
@@ -143,6 +143,18 @@ fn unit(one: &HiddenOutcome) -> String {
         .map_or_else(String::new, |size| format!(" {}", size.unit))
 }
 
+/// Whether a verdict itself has this size of an effect; else it has one of another form.
+fn is_stated(effect: &str, size: f64, verdict: &Verdict) -> bool {
+    verdict.steps.iter().all(|step| match &step.finding {
+        Finding::Name { parameters, .. } | Finding::Class { parameters, .. } => {
+            let is_first = step.finding.effects().first() == Some(&effect);
+            let has_form = is_first && step.form.is_some();
+            !has_form || parameters.iter().any(|fitted| fitted.value.value == size)
+        }
+        Finding::Unknown { .. } => true,
+    })
+}
+
 fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
     let of_all = if Role::WarmUpTime.is_of(&one.effect) && one.value != 0.0 {
         " in the fleet's mean (motors that were warm at take-off drift no more)"
@@ -160,7 +172,12 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
                 Some(false) => "; its 95 % interval misses the truth",
                 None => "",
             };
-            format!(" Found: {}{off}{interval}.", short(fitted))
+            let form = if is_stated(&one.effect, fitted, verdict) {
+                ""
+            } else {
+                " in the form that was hidden"
+            };
+            format!(" Found: {}{form}{off}{interval}.", short(fitted))
         }
         (None, ..) => String::new(),
     };

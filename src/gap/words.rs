@@ -89,9 +89,9 @@ fn values(parameters: &[Fitted], form: Option<&Form>) -> String {
     if parameters.is_empty() {
         return String::new();
     }
-    let of_form = form.filter(|form| !form.is_usual).map_or_else(String::new, |form| {
-        format!("; of the form with {} {}", form.name, short(form.value))
-    });
+    let of_form = form
+        .filter(|form| !form.is_usual)
+        .map_or_else(String::new, |form| format!("; with {} {}", form.name, short(form.value)));
     format!(" ({}{of_form})", parameters.iter().map(one).collect::<Vec<_>>().join("; "))
 }
 
