@@ -52,11 +52,16 @@ pub(super) fn doubt(map: &UpdraftMap, calibration: &FlightAnalysis) -> Option<Wa
         })
         .filter(|seen| seen.pair.0.is_finite() && seen.pair.1.is_finite())
         .collect();
-    depends(&apart(&seen)).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
+    doubted(&seen).map(|(correlation, spread_mps)| Warning::LawsOfOthers {
         drones: seen.len(),
         correlation,
         spread_mps,
     })
+}
+
+/// As [`depends`], if drones that are near to each other differ like this as well.
+fn doubted(seen: &[Seen]) -> Option<(f64, f64)> {
+    depends(seen).filter(|_| Levels::of(&apart(seen)).is_some_and(Levels::are_others))
 }
 
 /// Drones apart from the mean of those nearest to them, with the spread that they would have had with none beside them. Air
@@ -87,23 +92,41 @@ fn apart(seen: &[Seen]) -> Vec<Seen> {
     seen.iter().enumerate().map(one).collect()
 }
 
+/// What levels differ by and what is measured with them.
+#[derive(Clone, Copy, Debug)]
+struct Levels {
+    line: Line,
+    spread_mps: f64,
+    error_mps: f64,
+}
+
+impl Levels {
+    fn of(seen: &[Seen]) -> Option<Self> {
+        let line = Line::through(seen.iter().map(|one| one.pair))?;
+        let centre_mps = line.mean[0];
+        let spread_mps = rms(seen.iter().map(|one| one.pair.0 - centre_mps))?;
+        let errors = seen.iter().map(|one| one.error_mps).filter(|se| se.is_finite());
+        Some(Self { line, spread_mps, error_mps: rms(errors).unwrap_or(0.0) })
+    }
+
+    /// Whether they differ by more than their errors, and are found again in what is measured.
+    fn are_others(self) -> bool {
+        self.spread_mps > BEYOND_ERRORS * self.error_mps && self.line.slope() > SHARE
+    }
+}
+
 /// Correlation of the levels with the means that were measured, both in m/s, and the standard deviation of the levels;
 /// `None` as long as they may be independent, or the levels' errors (m/s) be all that they differ by.
 fn depends(seen: &[Seen]) -> Option<(f64, f64)> {
     if seen.len() < FEWEST {
         return None;
     }
-    let line = Line::through(seen.iter().map(|one| one.pair))?;
-    let correlation = line.correlation()?;
+    let levels = Levels::of(seen)?;
+    let correlation = levels.line.correlation()?;
     let freedom = (seen.len() - 2) as f64;
     let t = correlation * (freedom / (1.0 - correlation * correlation).max(1e-12)).sqrt();
     let chance = StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
-    let centre_mps = line.mean[0];
-    let spread_mps = rms(seen.iter().map(|one| one.pair.0 - centre_mps))?;
-    let error_mps =
-        rms(seen.iter().map(|one| one.error_mps).filter(|se| se.is_finite())).unwrap_or(0.0);
-    let is_beyond = spread_mps > BEYOND_ERRORS * error_mps;
-    (is_beyond && chance < CHANCE && line.slope() > SHARE).then_some((correlation, spread_mps))
+    (levels.are_others() && chance < CHANCE).then_some((correlation, levels.spread_mps))
 }
 
 #[cfg(test)]
@@ -135,7 +158,7 @@ mod tests {
                     at(drone, side, (level, draw(air_mps) + off), 0.03)
                 })
                 .collect();
-            depends(&apart(&seen)).is_some()
+            super::doubted(&seen).is_some()
         });
         found.count() as f64 / f64::from(fleets)
     }
@@ -180,6 +203,6 @@ mod tests {
             })
             .collect();
         assert!(depends(&seen).is_some(), "by the levels as they are");
-        assert!(depends(&apart(&seen)).is_none());
+        assert!(super::doubted(&seen).is_none());
     }
 }

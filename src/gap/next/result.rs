@@ -121,7 +121,8 @@ pub struct Verified {
     pub found: Vec<String>,
     /// Whether it named just that.
     pub told: bool,
-    /// Fisher z that was predicted for telling it from the other answers, or from nothing.
+    /// Fisher z that was predicted for telling it from the other answers; from nothing: its size over its standard error, as
+    /// the verdict will state it.
     #[serde(default)]
     pub predicted_z: f64,
     /// Fisher z that the search reached. From nothing: the size over its standard error. From other answers: the root of twice
