@@ -3,7 +3,7 @@
 pub(super) mod form;
 mod in_updraft;
 mod look;
-mod telling;
+pub(super) mod telling;
 
 pub(in crate::gap) use look::Seen;
 use look::{In, Look};

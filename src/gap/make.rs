@@ -13,8 +13,8 @@ use super::kept::{Question, grows};
 use super::left_out::LeftOut;
 use super::model_flights::ModelFlights;
 use super::noise::{
-    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
-    SIDE_GUSTS, SLOPES, WHITE,
+    GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME, SIDE_GUSTS,
+    SLOPES, WHITE,
 };
 use super::other_plan::without_strangers;
 use super::refine::Parameter;
@@ -194,6 +194,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         (Drones::default(), None)
     };
     let mut steps = found.steps.clone();
+    super::explain::telling::unknowns_once(&mut steps);
     steps.extend(spread);
     // Momentum drag on all axes took the place of what the leans told, or the pulse named the same body.
     let of_body = leans.as_ref().and_then(|step| step.finding.effects().first().copied());
@@ -221,7 +222,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         steps,
         rest: found.rest.clone(),
         detectable: detectable(&found)?,
-        noise: noise(&found.hyper, found.updraft_mps),
+        noise: noise(&found)?,
         wind,
         drones: differences,
         gap: shrink,
@@ -239,8 +240,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     Ok(Explained { verdict, model, found })
 }
 
-fn noise(hyper: &Hyper, updraft_mps: f64) -> Noise {
-    Noise {
+fn noise(found: &Found) -> Result<Noise, GapError> {
+    let hyper = &found.hyper;
+    Ok(Noise {
         shared_air_mps: hyper.get(SHARED),
         shared_air_s: hyper.get(SHARED_TIME),
         own_air_mps: hyper.get(OWN),
@@ -253,8 +255,9 @@ fn noise(hyper: &Hyper, updraft_mps: f64) -> Noise {
         gradient_mps: hyper.get(GRADIENT),
         side_gusts_mps: hyper.get(SIDE_GUSTS),
         pulse_noise_us: hyper.get(PULSE_NOISE),
-        updraft_mps,
-    }
+        updraft_mps: found.updraft_mps,
+        updraft_half_mps: super::updraft_error::half_mps(found)?,
+    })
 }
 
 /// Measured pulses of each climb speed, and the models' by the residuals of its regime.

@@ -57,6 +57,7 @@ mod together;
 #[cfg(test)]
 mod trial;
 mod unplanned;
+mod updraft_error;
 pub mod verdict;
 mod warning;
 pub mod words;

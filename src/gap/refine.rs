@@ -8,7 +8,7 @@ use super::compare::Comparison;
 use super::error::GapError;
 use super::generic::form_doubts;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::noise::{GroupPattern, Hyper, SHARED_TIME};
+use super::noise::{GroupPattern, Hyper, SHARED, SHARED_TIME};
 use super::pack;
 use super::power_channel;
 use super::response::shifted;
@@ -33,6 +33,8 @@ const FORM_SHARE: f64 = 0.03;
 /// Least factor of a 95 % interval: Student's with 18 degrees of freedom; longer flights are not believed to
 /// know their air better. Chosen.
 const INTERVAL: f64 = 2.1;
+/// Air that all drones share which moves by less is calm, m/s. Chosen.
+const CALM_MPS: f64 = 0.1;
 /// Fewest time scales that a noise is believed to be estimated from: Student's factor is 3.2 there. Below it
 /// intervals would be arbitrary.
 const FEWEST_SCALES: f64 = 3.0;
@@ -203,8 +205,11 @@ fn refine_free(
         }
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
         let is_fitted = fit_noise && (round == 0 || round == 2);
-        let solution =
-            if is_fitted { problem.fit(hyper, Likelihood::Restricted) } else { problem.at(&hyper) };
+        let solution = match is_fitted {
+            true if round == 0 => fit_from_both(&problem, hyper),
+            true => problem.fit(hyper, Likelihood::Restricted),
+            false => problem.at(&hyper),
+        };
         hyper = solution.hyper;
         shifts = shifted(&patterns, &problem, &solution).into_iter().map(|p| p.shift_mps).collect();
         let first = solution.beta.len() - parameters.len();
@@ -230,6 +235,18 @@ fn refine_free(
         }
     }
     last.ok_or(GapError::NothingCommon)
+}
+
+/// Noise by restricted likelihood, from the present one. In calm air the noise that a model had to have before it knew what
+/// was found now can be one that no small step makes likelier, and what is left of it was told as something unknown: so from the
+/// beginning, too, and the likelier is taken.
+fn fit_from_both(problem: &Problem<'_>, start: Hyper) -> Solution {
+    let near = problem.fit(start, Likelihood::Restricted);
+    if near.hyper.get(SHARED) > CALM_MPS || start == Hyper::default() {
+        return near;
+    }
+    let anew = problem.fit(Hyper::default(), Likelihood::Restricted);
+    if anew.log_posterior() > near.log_posterior() { anew } else { near }
 }
 
 /// What is not known exactly, as regressors of one standard deviation each: the updraft that the whole flight is

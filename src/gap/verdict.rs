@@ -313,6 +313,9 @@ pub struct Noise {
     /// Uniform updraft in which the flight is explained best, m/s.
     #[serde(default)]
     pub updraft_mps: f64,
+    /// Half of its 95 % interval, m/s.
+    #[serde(default)]
+    pub updraft_half_mps: Option<f64>,
 }
 
 /// The wind and how the vehicle leans in it.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use super::dependence::Dependence;
-use super::verdict::{Finding, Fitted, Form, Step, Verdict, is_strong_wind};
+use super::verdict::{Finding, Fitted, Form, Rest, Step, Verdict, is_strong_wind};
 use super::warning::Warning;
 use crate::effects::Role;
 
@@ -123,6 +123,17 @@ fn flew_in_other_wind(verdict: &Verdict) -> bool {
     verdict.cautions.iter().any(|caution| matches!(caution, Warning::OtherWind { .. }))
 }
 
+/// What explains more than chance does, and was not taken; empty: nothing does.
+fn too_little(rest: &Rest) -> String {
+    if rest.gain_nats <= rest.threshold_nats {
+        return String::new();
+    }
+    format!(
+        " It found that {} would explain more than chance does, but moves the pulse by too little, or as the air may.",
+        member(&rest.candidate)
+    )
+}
+
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
@@ -138,9 +149,10 @@ pub fn summary(verdict: &Verdict) -> String {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
         format!(
             "Nothing is missing that this flight could show: of {} effects it would have shown {} at \
-             their usual size.",
+             their usual size.{}",
             verdict.detectable.len(),
-            would
+            would,
+            too_little(&verdict.rest)
         )
     } else {
         let named: Vec<String> = verdict.steps.iter().map(phrase).collect();

@@ -308,8 +308,11 @@ pub(super) fn noise_rows(verdict: &Verdict) -> Vec<Value> {
         ),
         (
             "uniform updraft of the whole flight",
-            with_unit(noise.updraft_mps, "m/s"),
-            "where the flight is explained best",
+            noise.updraft_half_mps.map_or_else(
+                || with_unit(noise.updraft_mps, "m/s"),
+                |half| format!("{} ± {}", number(noise.updraft_mps), with_unit(half, "m/s")),
+            ),
+            "where the flight is explained best; 95 %",
         ),
     ];
     rows.into_iter().map(|(what, value, note)| context! { what, value, note }).collect()

@@ -151,9 +151,12 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
 fn air(page: &mut Page, verdict: &Verdict) {
     let updraft_mps = verdict.noise.updraft_mps;
     if updraft_mps.abs() >= LEAST_UPDRAFT_MPS {
+        let half = verdict.noise.updraft_half_mps;
+        let within = half.map_or_else(String::new, |half| format!(" ± {half:.2}"));
         let told = format!(
-            "Air: the whole flight is explained best in a uniform updraft of {} m/s",
-            signed(updraft_mps, 2)
+            "Air: the whole flight is explained best in a uniform updraft of {}{within} m/s{}",
+            signed(updraft_mps, 2),
+            if within.is_empty() { "" } else { " (95 %)" }
         );
         page.say("", &told, 2);
     }

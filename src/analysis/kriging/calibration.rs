@@ -12,10 +12,15 @@ use super::scatter::Scatter;
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
+use crate::numeric::log_sum;
 
-/// How much stronger the air of the calibration may have been than that of the hover, with weights: hours
-/// apart the air differs by such factors. Chosen.
-const STRENGTHS: [(f64, f64); 3] = [(0.6, 0.25), (1.0, 0.5), (1.7, 0.25)];
+/// How much stronger the air of the calibration may have been than that of the hover, with weights: hours apart the air differs
+/// by such factors, and a calm morning from a day with thermals by the small ones. From strong to weak. Chosen.
+const STRENGTHS: [(f64, f64); 6] =
+    [(1.7, 0.2), (1.0, 0.4), (0.6, 0.2), (0.2, 0.1), (0.06, 0.05), (0.02, 0.05)];
+/// A strength is not asked for where the one before it explains the windows by so much less than the best, nats: they tell how
+/// much the air changed, and the weaker it is said to be, the worse that gets.
+const NOT_WEAKER_NATS: f64 = 12.0;
 /// How much longer the air is in height than on the level, with weights: turbulence is alike in all
 /// directions, thermals are tall.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
@@ -192,10 +197,16 @@ impl<'a> Calibration<'a> {
         let mut found = Vec::new();
         for (taller, tall_weight) in TALLER {
             let air = self.between(&covariance, taller);
+            let mut best = f64::NEG_INFINITY;
             for (strength, weight) in STRENGTHS {
-                for white_us in WHITES_US {
-                    let ln_weight = (weight * tall_weight).ln();
-                    found.extend(self.component(&air, strength, &plane, white_us, ln_weight));
+                let ln_weight = (weight * tall_weight).ln();
+                let of = |white_us| self.component(&air, strength, &plane, white_us, ln_weight);
+                let these: Vec<Component> = WHITES_US.into_iter().filter_map(of).collect();
+                let most = these.iter().map(|one| one.log_weight).fold(f64::NEG_INFINITY, f64::max);
+                best = best.max(most);
+                found.extend(these);
+                if most < best - NOT_WEAKER_NATS {
+                    break;
                 }
             }
         }
@@ -259,25 +270,35 @@ impl<'a> Calibration<'a> {
     /// drones' places, m/s.
     pub(super) fn own_mps(&self, air: &Air) -> f64 {
         let covariance = Covariance::new(*air);
-        let Between { by_field, by_gusts, .. } = self.between(&covariance, 1.0);
-        let alone = |row, column| by_field[(row, column)] + by_gusts[(row, column)];
+        let air = self.between(&covariance, 1.0);
+        let alone = |row, column| air.by_field[(row, column)] + air.by_gusts[(row, column)];
         let own = self.windows.record.fit_in(alone, OWN_WHITE_US).map(|fit| {
             let plane = Plane::of(&[covariance], self.homes_m);
             let square = self.slope.powi(2);
-            let (all, by_field) =
-                (fit.covariance[(0, 0)] / square, self.by_air_us2(&fit, &by_field) / square);
+            let of = |air: &DMatrix<f64>| self.by_air_us2(&fit, air) / square;
+            let (all, by_field, by_gusts) =
+                (fit.covariance[(0, 0)] / square, of(&air.by_field), of(&air.by_gusts));
             let beside = by_field * (1.0 - plane.share);
-            all - by_field + self.mean_square_strength(beside) * beside
+            let strength2 = self.mean_square_strength(&air, &plane, beside);
+            all - by_field - by_gusts + strength2 * (beside + by_gusts)
         });
         own.map_or(0.0, |square| square.max(0.0).sqrt())
     }
 
-    /// Mean square of the strength of the calibration's air, by how the drones' constants scatter, where air as strong as the
-    /// hover's adds so much to their variance, (m/s)².
-    fn mean_square_strength(&self, by_air: f64) -> f64 {
+    /// Mean square of the strength of the calibration's air, by how much it changed between the windows and by how the drones'
+    /// constants scatter, where air as strong as the hover's adds so much to their variance, (m/s)².
+    fn mean_square_strength(&self, air: &Between, plane: &Plane, by_air: f64) -> f64 {
         let weighed = STRENGTHS.map(|(strength, weight)| {
             let square: f64 = strength * strength;
-            (square, weight.ln() + self.scatters(square * by_air))
+            let of = |white_us| self.component(air, strength, plane, white_us, weight.ln());
+            let by_windows: Vec<f64> =
+                WHITES_US.into_iter().filter_map(of).map(|one| one.log_weight).collect();
+            let ln = if by_windows.is_empty() {
+                weight.ln() + self.scatters(square * by_air)
+            } else {
+                log_sum(by_windows)
+            };
+            (square, ln)
         });
         let most = weighed.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
         let (mut sum, mut all) = (0.0, 0.0);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::calibration::Calibration;
+use super::calibration::{Calibration, Component};
 use super::covariance::{Air, Form};
 use super::data::{Drone, Value};
 use super::make::{Input, Posterior, posterior};
@@ -112,6 +112,31 @@ fn what_a_rotor_has_besides_its_law_is_not_taken_for_air_that_changes_with_heigh
         |calibration: &Calibration<'_>| calibration.known(&[air(205.0)]).unwrap().shift[0];
     let moved_us = zero_us(&calibration) - zero_us(&without);
     assert!(moved_us.abs() < 0.25, "{moved_us:.2}");
+}
+
+/// Standard error of the zero over all that is left open, and of a drone's own constant, m/s.
+fn errors_mps(windows: &Windows, air: &Air) -> [f64; 2] {
+    let homes_m = homes_m();
+    let calibration = Calibration::new(windows, &homes_m, SLOPE_US);
+    let all = calibration.components(air);
+    let most = all.iter().map(|one| one.log_weight).fold(f64::NEG_INFINITY, f64::max);
+    let weighed = || all.iter().map(|one| ((one.log_weight - most).exp(), one));
+    let sum: f64 = weighed().map(|(weight, _)| weight).sum();
+    let mean = weighed().map(|(weight, one)| weight * one.shift[0]).sum::<f64>() / sum;
+    let of = |one: &Component| one.covariance[(0, 0)] + (one.shift[0] - mean).powi(2);
+    let variance = weighed().map(|(weight, one)| weight * of(one)).sum::<f64>() / sum;
+    [variance.sqrt() / SLOPE_US, calibration.own_mps(air)]
+}
+
+#[test]
+fn a_calibration_on_a_calm_morning_knows_its_zero_whatever_moves_in_the_hover() {
+    let moving = Air { gust_mps: 0.3, ..air(145.0) };
+    let moved_us = |cell: &CellAt| SLOPE_US * 0.4 * (cell.time_s / 60.0).sin();
+    let [calm, moved] = [windows(ladder(), 0.15, |_| 0.0), windows(ladder(), 0.15, moved_us)]
+        .map(|windows| errors_mps(&windows, &moving));
+    assert!(calm[0] < 0.03 && calm[1] < 0.02, "{calm:?}");
+    // In air like the hover's it does not.
+    assert!(moved[0] > 0.15 && moved[1] > 0.04, "{moved:?}");
 }
 
 #[test]

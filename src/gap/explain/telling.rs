@@ -2,6 +2,7 @@
 
 use super::super::candidates::{Candidate, Size, Variant};
 use super::super::compare::Comparison;
+use super::super::dependence::Dependence;
 use super::super::generic::drawn;
 use super::super::search::{Round, Sought, Thresholds};
 use super::super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
@@ -28,6 +29,18 @@ pub(super) fn told_once(steps: &mut Vec<Step>) {
             true
         }
         Finding::Class { .. } | Finding::Unknown { .. } => true,
+    });
+}
+
+/// Something unknown that was found again, when the rest of the model had changed beside it, is one finding: that of the first
+/// time.
+pub(in super::super) fn unknowns_once(steps: &mut Vec<Step>) {
+    let mut told: Vec<Dependence> = Vec::new();
+    steps.retain(|step| {
+        let Finding::Unknown { depends_on, .. } = step.finding else { return true };
+        let is_new = !told.contains(&depends_on);
+        told.push(depends_on);
+        is_new
     });
 }
 

@@ -81,14 +81,37 @@ pub(in crate::workflow) fn doubts_of_held(
             reasons.extend(other_campaign(planned, *seed, plan, flight));
         }
     }
+    of_others(&path.shown().to_string(), with_map, reasons)
+}
+
+/// What speaks against the laws of a calibration that was flown in another campaign than the flights that it measures: one
+/// sentence, or nothing.
+pub(super) fn doubts_of_another_campaign(work: &Work) -> Option<String> {
+    let calibrates = |one: &&Found| one.purpose == Some(Purpose::Calibration);
+    let mut calibrations =
+        work.flights.iter().filter(calibrates).filter(|one| !one.logs.is_empty());
+    let calibration = calibrations.next()?;
+    let calibrated = calibration.plan.as_ref()?;
+    let has_own = |flight: &Found| {
+        work.flights.iter().filter(calibrates).any(|one| one.campaign == flight.campaign)
+    };
+    let mut reasons = Vec::new();
+    for flight in work.flights.iter().filter(|one| !calibrates(one) && !has_own(one)) {
+        let Some(plan) = &flight.plan else { continue };
+        reasons.extend(other_campaign(calibrated, calibration.seed, plan, flight));
+    }
+    of_others(&calibration.name, true, reasons)
+}
+
+/// That laws seem to be those of other drones, for these reasons.
+fn of_others(laws: &str, with_map: bool, mut reasons: Vec<String>) -> Option<String> {
     reasons.dedup();
     (!reasons.is_empty()).then(|| {
         let what = if with_map { "the map" } else { "the updraft" };
         format!(
-            "the laws of {} seem to be those of other drones: {}. Each drone has its own law; with \
+            "the laws of {laws} seem to be those of other drones: {}. Each drone has its own law; with \
              another fleet's laws {what} is wrong by as much as the fleets differ, which the \
              stated errors do not include. Use the laws of a calibration of these drones",
-            path.shown(),
             reasons.join("; ")
         )
     })

@@ -102,6 +102,7 @@ impl<'a> Analysing<'a> {
         let doubts = hold
             .zip(reference.as_ref())
             .and_then(|(path, (reference, _))| doubts_of_held(path, reference, indicator, work));
+        let doubts = if hold.is_some() { doubts } else { held::doubts_of_another_campaign(work) };
         Ok(Self { host, work, settings, reference, doubts })
     }
 

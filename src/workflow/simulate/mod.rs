@@ -147,6 +147,14 @@ pub(crate) fn make_ready<'a>(
     simulation: &Simulation,
 ) -> Result<Ready<'a>, WorkflowError> {
     let vehicle = resolved_vehicle(folder, simulation.vehicle.as_ref(), &simulation.effects)?;
+    if !simulation.effects.is_empty() {
+        host.say(&format!(
+            "{}: flown with {}, which its vehicle.toml does not say: `updraft analyze` does not know of it, and \
+             `updraft gap` looks for it",
+            plan.name,
+            simulation.effects.join(", ")
+        ));
+    }
     if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
         return Err(WorkflowError::Usage(format!(
             "{} has no slot {stray}; slots are 1 to {}",

@@ -28,6 +28,7 @@ fn noise() -> Noise {
         side_gusts_mps: 0.2,
         pulse_noise_us: 0.3,
         updraft_mps: 0.0,
+        updraft_half_mps: None,
     }
 }
 

@@ -200,6 +200,7 @@ pub(crate) fn nothing() -> Verdict {
             side_gusts_mps: 0.2,
             pulse_noise_us: 0.3,
             updraft_mps: 0.0,
+            updraft_half_mps: None,
         },
         drones: Drones {
             each: each.collect(),
