@@ -215,3 +215,18 @@ fn simulated_logs_are_home_and_can_be_verified() {
     planned.plan();
     assert_snapshot!(planned.expect(5, &["logs", "verify", "campaign"]).err);
 }
+
+#[test]
+fn laws_of_another_campaign_are_doubted_as_held_ones_are() {
+    let bench = Bench::new();
+    for (folder, seed) in [("one", "5"), ("two", "6")] {
+        fly(&bench, folder, &["--grid", "1x2", "--seed", seed]);
+    }
+    let told = analyze(&bench, 0, &["one/calibration", "two/hover"]);
+    let words: Vec<&str> = told.out.split_whitespace().collect();
+    let doubt = "the laws of calibration seem to be those of other drones: they were simulated with seed 5, \
+                 and hover with seed 6: other drones.";
+    assert!(words.join(" ").contains(doubt), "{told}");
+    let own = analyze(&bench, 0, &["two"]);
+    assert!(!own.out.contains("seem to be those of other drones"), "{own}");
+}
