@@ -19,6 +19,8 @@ const CHANCE: f64 = 0.003;
 /// Share of the levels' differences that is found again in what is measured: all of it with others' laws; with their own
 /// no more than what the levels themselves are off by.
 const SHARE: f64 = 0.5;
+/// The same among drones that are near to each other, which tell less of it.
+const SHARE_OF_NEAR: f64 = 0.25;
 /// Levels must differ by so many times their standard errors. What they are off by is in all that their own laws measure, and of drones
 /// that are alike nothing else is in the levels. Chosen: a quarter of their variance is then error.
 const BEYOND_ERRORS: f64 = 2.0;
@@ -61,7 +63,8 @@ pub(super) fn doubt(map: &UpdraftMap, calibration: &FlightAnalysis) -> Option<Wa
 
 /// As [`depends`], if drones that are near to each other differ like this as well.
 fn doubted(seen: &[Seen]) -> Option<(f64, f64)> {
-    depends(seen).filter(|_| Levels::of(&apart(seen)).is_some_and(Levels::are_others))
+    depends(seen)
+        .filter(|_| Levels::of(&apart(seen)).is_some_and(|levels| levels.are_others(SHARE_OF_NEAR)))
 }
 
 /// Drones apart from the mean of those nearest to them, with the spread that they would have had with none beside them. Air
@@ -110,8 +113,8 @@ impl Levels {
     }
 
     /// Whether they differ by more than their errors, and are found again in what is measured.
-    fn are_others(self) -> bool {
-        self.spread_mps > BEYOND_ERRORS * self.error_mps && self.line.slope() > SHARE
+    fn are_others(self, share: f64) -> bool {
+        self.spread_mps > BEYOND_ERRORS * self.error_mps && self.line.slope() > share
     }
 }
 
@@ -126,7 +129,7 @@ fn depends(seen: &[Seen]) -> Option<(f64, f64)> {
     let freedom = (seen.len() - 2) as f64;
     let t = correlation * (freedom / (1.0 - correlation * correlation).max(1e-12)).sqrt();
     let chance = StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
-    (levels.are_others() && chance < CHANCE).then_some((correlation, levels.spread_mps))
+    (levels.are_others(SHARE) && chance < CHANCE).then_some((correlation, levels.spread_mps))
 }
 
 #[cfg(test)]

@@ -292,6 +292,19 @@ mod tests {
              are left; noise and air alone would leave 6.0."
         );
         assert!(summary(6.4, 2.25).starts_with("Nothing is missing"), "nobody would miss it");
+        let of_two_winds = |rungs: Option<Shrink>| {
+            let cautions = vec![Warning::OtherWind { lean_deg: 5.0 }];
+            let gap = Gap { rungs, ..Gap::default() };
+            crate::gap::words::summary(&Verdict { cautions, gap, ..Verdict::default() })
+        };
+        let much = Shrink {
+            after_without_air_us: 9.0,
+            floor_us: 6.0,
+            chi2: (2.3, 2.3),
+            ..Shrink::default()
+        };
+        let left = of_two_winds(Some(much));
+        assert!(left.contains("whether anything is missing besides"), "{left}");
         let cautions = vec![Warning::OtherWind { lean_deg: 5.0 }];
         let in_two_winds = crate::gap::words::summary(&Verdict { cautions, ..Verdict::default() });
         assert!(in_two_winds.starts_with("The two sides flew in different wind"), "{in_two_winds}");

@@ -137,7 +137,10 @@ fn too_little(rest: &Rest) -> String {
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
-    let mut text = if verdict.is_unexplained() {
+    let mut text = if verdict.is_unexplained() && flew_in_other_wind(verdict) {
+        "The two sides flew in different wind: whether anything is missing besides, this comparison cannot tell."
+            .to_owned()
+    } else if verdict.is_unexplained() {
         "Something is missing, and this comparison cannot say what.".to_owned()
     } else if verdict.steps.is_empty() && is_strong_wind && verdict.gap.left_over().is_some() {
         "This flight cannot tell whether something is missing.".to_owned()
