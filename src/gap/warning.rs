@@ -295,7 +295,7 @@ mod tests {
         let of_two_winds = |rungs: Option<Shrink>| {
             let cautions = vec![Warning::OtherWind { lean_deg: 5.0 }];
             let gap = Gap { rungs, ..Gap::default() };
-            crate::gap::words::summary(&Verdict { cautions, gap, ..Verdict::default() })
+            crate::gap::words::summary(&Verdict { gap, cautions, ..Verdict::default() })
         };
         let much = Shrink {
             after_without_air_us: 9.0,
