@@ -238,8 +238,7 @@ fn refine_free(
 }
 
 /// Noise by restricted likelihood, from the present one. In calm air the noise that a model had to have before it knew what
-/// was found now can be one that no small step makes likelier, and what is left of it was told as something unknown: so from the
-/// beginning, too, and the likelier is taken.
+/// was found now can be one that no small step makes likelier: so from the beginning, too, and the likelier is taken.
 fn fit_from_both(problem: &Problem<'_>, start: Hyper) -> Solution {
     let near = problem.fit(start, Likelihood::Restricted);
     if near.hyper.get(SHARED) > CALM_MPS || start == Hyper::default() {
