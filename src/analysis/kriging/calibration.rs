@@ -200,8 +200,7 @@ impl<'a> Calibration<'a> {
             let mut best = f64::NEG_INFINITY;
             for (strength, weight) in STRENGTHS {
                 let ln_weight = (weight * tall_weight).ln();
-                let of = |white_us| self.component(&air, strength, &plane, white_us, ln_weight);
-                let these: Vec<Component> = WHITES_US.into_iter().filter_map(of).collect();
+                let these = self.of_strength(&air, strength, &plane, ln_weight);
                 let most = these.iter().map(|one| one.log_weight).fold(f64::NEG_INFINITY, f64::max);
                 best = best.max(most);
                 found.extend(these);
@@ -211,6 +210,18 @@ impl<'a> Calibration<'a> {
             }
         }
         found
+    }
+
+    /// The fleet's law in air that is so many times as strong, with each white scatter of the windows that they determine it with.
+    fn of_strength(
+        &self,
+        air: &Between,
+        strength: f64,
+        plane: &Plane,
+        ln_weight: f64,
+    ) -> Vec<Component> {
+        let of = |white_us| self.component(air, strength, plane, white_us, ln_weight);
+        WHITES_US.into_iter().filter_map(of).collect()
     }
 
     /// The fleet's law in air of known scales, alike in all directions and as strong as they say.
@@ -290,13 +301,11 @@ impl<'a> Calibration<'a> {
     fn mean_square_strength(&self, air: &Between, plane: &Plane, by_air: f64) -> f64 {
         let weighed = STRENGTHS.map(|(strength, weight)| {
             let square: f64 = strength * strength;
-            let of = |white_us| self.component(air, strength, plane, white_us, weight.ln());
-            let by_windows: Vec<f64> =
-                WHITES_US.into_iter().filter_map(of).map(|one| one.log_weight).collect();
+            let by_windows = self.of_strength(air, strength, plane, weight.ln());
             let ln = if by_windows.is_empty() {
                 weight.ln() + self.scatters(square * by_air)
             } else {
-                log_sum(by_windows)
+                log_sum(by_windows.iter().map(|one| one.log_weight))
             };
             (square, ln)
         });
