@@ -306,6 +306,11 @@ impl Messages {
         if assigned.is_empty() { (1..=4).collect() } else { assigned }
     }
 
+    /// Share of the square in the motors' thrust that the autopilot counts with.
+    pub(super) fn thrust_expo(&self) -> Option<f64> {
+        self.parameters.get("MOT_THST_EXPO").copied()
+    }
+
     /// Pulse widths between which a spinning motor is kept, us.
     pub(super) fn pulse_limits_us(&self) -> (f64, f64) {
         let value = |name: &str| self.parameters.get(name).copied().filter(|v| *v > 0.0);

@@ -110,6 +110,8 @@ pub struct Flight {
     pub armed_s: Vec<(f64, f64)>,
     /// Pulse widths between which the autopilot keeps a spinning motor, us: (lowest, highest).
     pub pulse_limits_us: (f64, f64),
+    /// Share of the square in the motors' thrust that the autopilot counts with (`MOT_THST_EXPO`), if the log has it.
+    pub thrust_expo: Option<f64>,
     /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
     pub first_fix_deg: Option<(f64, f64)>,
     /// Place on the globe over time; absent: the log has none.

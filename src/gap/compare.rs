@@ -1,6 +1,7 @@
 //! One comparison: the measured side, the simulated side, and the residual for any vehicle.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
@@ -387,9 +388,10 @@ impl Comparison {
                 let hover_us = mean(hovers.map(|(_, pulse_us)| pulse_us))
                     .or_else(|| mean(&pulses))
                     .unwrap_or_default();
+                let after_s = FLIGHTS_APART_S * of.flight as f64;
                 GroupPattern {
                     drones: of.slots.len(),
-                    time_s: of.bins.iter().map(Bin::middle_s).collect(),
+                    time_s: of.bins.iter().map(|bin| after_s + bin.middle_s()).collect(),
                     height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
                     response: response[group].clone(),
                     shift_mps: Vec::new(),
@@ -520,13 +522,27 @@ impl Comparison {
     pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
         let closed = self.scene_of(vehicle).pulses(vehicle)?;
         let Wind { mean_se_mps, mean_mps, .. } = self.wind;
-        let by_axis = [0, 1].map(|axis| self.by_wind(vehicle, &closed, axis, mean_se_mps));
-        let [forward, left] = by_axis;
-        let (forward, left) = (forward?, left?);
+        // As surely as each flight's own wind is known.
+        let own_se_mps =
+            |group: usize| self.wind.of_groups_se_mps.get(group).copied().unwrap_or(mean_se_mps);
+        let by_axis = |axis| -> Result<Column, EffectError> {
+            let by = self.by_wind(vehicle, &closed, axis, mean_se_mps)?;
+            if self.wind.of_groups_se_mps.is_empty() {
+                return Ok(by);
+            }
+            Ok(by.each(|group, drone, bin| {
+                own_se_mps(group) / mean_se_mps * by.at(group, drone, bin)
+            }))
+        };
+        let (forward, left) = (by_axis(0)?, by_axis(1)?);
         // What a wind does that is misread by so much, along the wind.
-        let share = |axis: usize| LEAN_FORM_SHARE * mean_mps[axis] / mean_se_mps;
+        let share = |group: usize, axis: usize| {
+            let own_mps = self.wind.of_groups_mps.get(group).unwrap_or(&mean_mps);
+            LEAN_FORM_SHARE * own_mps[axis] / own_se_mps(group)
+        };
         let misread = |group, drone, bin| {
-            share(0) * forward.at(group, drone, bin) + share(1) * left.at(group, drone, bin)
+            share(group, 0) * forward.at(group, drone, bin)
+                + share(group, 1) * left.at(group, drone, bin)
         };
         let with_climb = if mean_se_mps > 0.0 {
             climb_shapes(&self.scene, LEAN_FORM_ORDERS)
@@ -609,7 +625,8 @@ impl Comparison {
     ) -> Result<Option<Column>, EffectError> {
         let Some(wind_mps) = self.other_wind_mps else { return Ok(None) };
         let mut wind = self.wind.clone();
-        for (air, group) in wind.air_mps.iter_mut().zip(&self.data.groups) {
+        let others = wind.air_mps.iter_mut().zip(&self.data.groups);
+        for (air, group) in others.filter(|(_, group)| self.is_apart(group.flight)) {
             for (air, bin) in air.iter_mut().zip(&group.bins) {
                 *air = [0, 1].map(|axis: usize| bin.velocity_mps[axis] - wind_mps[axis]);
             }
@@ -618,18 +635,25 @@ impl Comparison {
         Ok((doubt.spread(&self.data.counts()) > LEAST_DOUBT_US).then_some(doubt))
     }
 
-    /// Change of the pulse by one standard deviation of the updraft that the whole flight may be in: nobody
+    /// Change of the pulse by one standard deviation of the updraft that a whole flight may be in, for each flight: nobody
     /// knows it before, and where the response is curved it changes how the pulse goes with climb.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
-    pub(super) fn updraft_doubt(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+    pub(super) fn updraft_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
         let scene = self.scene_of(vehicle);
         let at = |by_mps: f64| scene.in_updraft(self.scene.updraft_mps + by_mps).pulses(vehicle);
         let (more, less) = (at(UPDRAFT_STEP_MPS)?, at(-UPDRAFT_STEP_MPS)?);
         let per_doubt = UPDRAFT_DOUBT_MPS / (2.0 * UPDRAFT_STEP_MPS);
         let change = more.less(&less);
-        Ok(change.each(|group, drone, bin| per_doubt * change.at(group, drone, bin)))
+        let flights: BTreeSet<usize> = self.data.groups.iter().map(|group| group.flight).collect();
+        let of_flight = |flight: usize| {
+            change.each(|group, drone, bin| {
+                let is_own = self.data.groups[group].flight == flight;
+                if is_own { per_doubt * change.at(group, drone, bin) } else { 0.0 }
+            })
+        };
+        Ok(flights.into_iter().map(of_flight).collect())
     }
 
     /// What more wind along an axis of the show does to the vehicle's closed form, us.
@@ -652,10 +676,22 @@ impl Comparison {
         }
     }
 
-    /// Distance of the mean leans of both sides in hover and in vertical flight, rad.
+    /// Distance of the mean leans of both sides in hover and in vertical flight, rad: of several flights in that which
+    /// is farthest.
     pub fn apart_rad(&self) -> f64 {
+        let of_flights = self.data.groups.iter().map(|group| self.apart_in_rad(group.flight));
+        most(of_flights).unwrap_or_default()
+    }
+
+    /// Whether a flight was flown in another wind than the simulated side.
+    fn is_apart(&self, flight: usize) -> bool {
+        self.apart_in_rad(flight) > OTHER_WIND_DEG.to_radians()
+    }
+
+    fn apart_in_rad(&self, flight: usize) -> f64 {
         let (mut sum, mut count) = ([0.0_f64; 2], 0.0);
-        for (group, side) in self.data.groups.iter().zip(&self.side) {
+        let groups = self.data.groups.iter().zip(&self.side);
+        for (group, side) in groups.filter(|(group, _)| group.flight == flight) {
             for (bin, values) in side.iter().enumerate() {
                 if group.bins[bin].is_horizontal() {
                     continue;
@@ -735,6 +771,9 @@ const SIDE_STEP_MPS: f64 = 0.25;
 pub(super) const UPDRAFT_DOUBT_MPS: f64 = 3.0;
 /// Half of the step of the derivative by the updraft, m/s. Numerical.
 const UPDRAFT_STEP_MPS: f64 = 0.1;
+/// Flights are so far apart for the noise, s: none of the air of one is left in the next, and all else that it takes has no
+/// clock. Numerical.
+const FLIGHTS_APART_S: f64 = 1e7;
 /// Fewest bins of a comparison. Chosen; the noise alone has 11 parameters.
 const FEWEST_BINS: usize = 12;
 

@@ -1,6 +1,8 @@
 //! Measured values: all drones of a campaign's flight, in steady bins that are common to each
 //! group.
 
+use std::collections::BTreeSet;
+
 use super::bins::{Bin, BinValues, of_segments};
 use super::left_out::LeftOut;
 use super::measure::measured;
@@ -65,6 +67,8 @@ pub struct Group {
     pub measured: Vec<Vec<BinValues>>,
     /// Show time at which the motors started, s (earliest of the drones).
     pub armed_s: f64,
+    /// Which flight it flew in, counted from 0: groups of one flight share their air and wind.
+    pub flight: usize,
 }
 
 impl Group {
@@ -88,6 +92,7 @@ impl Group {
             neighbours: pick(&self.neighbours, &keep),
             measured: pick(&self.measured, &keep),
             armed_s: self.armed_s,
+            flight: self.flight,
         }
     }
 }
@@ -143,17 +148,24 @@ impl Data {
     pub fn of_logs(flown: &[Flown<'_>], steps: Option<&Steps>, thrust_exponent: f64) -> Self {
         let mut data = Self::default();
         let groups = unplanned::groups(flown, steps);
-        for (index, (bins, members)) in groups.iter().enumerate() {
+        let last_flight = groups.iter().map(|group| group.flight).max().unwrap_or(0);
+        for (index, group) in groups.iter().enumerate() {
+            let unplanned::Group { bins, members, flight } = group;
             let values = members
                 .iter()
                 .map(|one| (one.slot, [0.0; 2], measured(one.flight, bins, 0.0, thrust_exponent)))
                 .collect();
             let armed_s = first_armed_s(members.iter().map(|one| one.flight));
-            let name = match groups.len() {
-                1 => "all".to_owned(),
-                _ => format!("group {}", index + 1),
+            let of_flight = groups.iter().filter(|other| other.flight == *flight).count();
+            let name = match (groups.len(), last_flight, of_flight) {
+                (1, ..) => "all".to_owned(),
+                (_, 0, _) => format!("group {}", index + 1),
+                (.., 1) => format!("flight {}", flight + 1),
+                _ => format!("flight {}, group {}", flight + 1, index + 1),
             };
+            let before = data.groups.len();
             data.add(&name, bins, values, armed_s);
+            data.groups[before..].iter_mut().for_each(|added| added.flight = *flight);
         }
         data.resistance_ohm = resistance_ohm(flown);
         data
@@ -308,6 +320,12 @@ impl Data {
         }
         self.groups.retain(|group| !group.slots.is_empty());
         last
+    }
+
+    /// Number of flights that its groups flew in.
+    pub(super) fn flights(&self) -> usize {
+        let flights: BTreeSet<usize> = self.groups.iter().map(|group| group.flight).collect();
+        flights.len()
     }
 
     /// Number of drones in all groups.

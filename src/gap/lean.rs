@@ -264,10 +264,14 @@ impl LeanLaw {
 /// The horizontal air as the leans of a flight show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wind {
-    /// Mean wind, show frame, the direction it blows to, m/s.
+    /// Mean wind, show frame, the direction it blows to, m/s; of several flights that of all together.
     pub mean_mps: [f64; 2],
+    /// Where the logs are of several flights: the mean wind of that which each group flew in, m/s; empty otherwise.
+    pub of_groups_mps: Vec<[f64; 2]>,
     /// Standard error of the mean wind along either axis, m/s.
     pub mean_se_mps: f64,
+    /// That of each group's own mean wind, m/s; empty: they share one.
+    pub of_groups_se_mps: Vec<f64>,
     /// Air speed of each group's drones in each bin, show frame, m/s.
     pub air_mps: Vec<Vec<[f64; 2]>>,
     /// Lean law that the flight's horizontal legs showed; `None` if it has none, so that the
@@ -308,11 +312,14 @@ pub(super) fn wind_by(
 ) -> Wind {
     let leans = settled_leans(data, flown_law, flown);
     let MeanWind { mean_mps, law, legs } = MeanWind::of(data, &leans, law, flown.is_some());
+    let of_groups_mps = of_flights(data, &leans, law);
     let air_mps = data
         .groups
         .iter()
         .zip(&leans)
-        .map(|(group, leans)| {
+        .enumerate()
+        .map(|(index, (group, leans))| {
+            let mean_mps = of_groups_mps.get(index).copied().unwrap_or(mean_mps);
             let air = |(bin, lean): (&Bin, &[f64; 2])| {
                 let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
                 let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
@@ -322,14 +329,31 @@ pub(super) fn wind_by(
             smooth(group, &raw)
         })
         .collect();
-    let speed_mps = mean_mps[0].hypot(mean_mps[1]);
-    let law_mps = legs.map_or(LAW_DOUBT * speed_mps, |legs| {
-        legs.mean_se_mps.hypot(LEGS_DOUBT * speed_mps).min(LAW_DOUBT * speed_mps)
-    });
-    let mean_se_mps = LEAST_DOUBT_MPS.hypot(law_mps);
+    let doubt_mps = |mean_mps: &[f64; 2]| {
+        let speed_mps = mean_mps[0].hypot(mean_mps[1]);
+        let law_mps = legs.as_ref().map_or(LAW_DOUBT * speed_mps, |legs| {
+            legs.mean_se_mps.hypot(LEGS_DOUBT * speed_mps).min(LAW_DOUBT * speed_mps)
+        });
+        LEAST_DOUBT_MPS.hypot(law_mps)
+    };
+    let mean_se_mps = doubt_mps(&mean_mps);
+    let of_groups_se_mps = of_groups_mps.iter().map(doubt_mps).collect();
     let measured =
         legs.map(|legs| Measured { law, linear_se: legs.linear_se, misfit_nats: legs.misfit_nats });
-    Wind { mean_mps, mean_se_mps, air_mps, measured }
+    Wind { mean_mps, of_groups_mps, mean_se_mps, of_groups_se_mps, air_mps, measured }
+}
+
+/// The mean wind of the flight that each group flew in, by a law, m/s; empty: there is one flight.
+fn of_flights(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw) -> Vec<[f64; 2]> {
+    if data.flights() < 2 {
+        return Vec::new();
+    }
+    let of_group = |group: &Group| {
+        let is_own = |other: &Group| other.flight == group.flight;
+        let own = data.groups.iter().zip(leans).filter(|(other, _)| is_own(other));
+        hovering_wind(&points(own), law)
+    };
+    data.groups.iter().map(of_group).collect()
 }
 
 /// Standard error along an axis with which the leans of a flight that is yet to be flown will tell a mean wind, m/s.
@@ -386,14 +410,14 @@ fn settled_leans(
         .collect()
 }
 
-/// The mean lean of each group in each bin.
-fn points(data: &Data, leans: &[Vec<[f64; 2]>]) -> Vec<Point> {
+/// The mean lean of groups in each bin.
+fn points<'a>(groups: impl Iterator<Item = (&'a Group, &'a Vec<[f64; 2]>)>) -> Vec<Point> {
     let of_group = |(group, leans): (&Group, &Vec<[f64; 2]>)| -> Vec<Point> {
         let height_m = |bin: usize| group.mean(bin, |values| values.height_m);
         let each = group.bins.iter().zip(leans).enumerate();
         each.map(|(place, (bin, lean))| Point::of(bin, height_m(place), *lean)).collect()
     };
-    data.groups.iter().zip(leans).flat_map(of_group).collect()
+    groups.flat_map(of_group).collect()
 }
 
 /// Whether there are legs enough to fit a law to.
@@ -409,14 +433,16 @@ pub(super) fn body(
     flown: (&[Vec<BinValues>], [f64; 3]),
     measured: &Measured,
 ) -> Option<Body> {
-    let points = points(data, &settled_leans(data, law, Some(flown)));
+    let leans = settled_leans(data, law, Some(flown));
+    let points = points(data.groups.iter().zip(&leans));
     moves(&points).then(|| fit_body(points, law, measured.misfit_nats))
 }
 
 /// How unlikely the leans are by a vehicle's law in the updraft that it holds in, nats, but for a constant. `flown` is as in
 /// [`wind`].
 pub(super) fn misfit_nats(data: &Data, law: LeanLaw, flown: (&[Vec<BinValues>], [f64; 3])) -> f64 {
-    lean_misfit::misfit_nats(points(data, &settled_leans(data, law, Some(flown))), law)
+    let leans = settled_leans(data, law, Some(flown));
+    lean_misfit::misfit_nats(points(data.groups.iter().zip(&leans)), law)
 }
 
 /// The mean of the wind with the law of the lean that it was read by.
@@ -429,7 +455,7 @@ struct MeanWind {
 
 impl MeanWind {
     fn of(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw, is_flown: bool) -> Self {
-        let points = points(data, leans);
+        let points = points(data.groups.iter().zip(leans));
         if moves(&points) && is_flown {
             let legs = fit(points, law);
             return Self { mean_mps: legs.mean_mps, law: legs.law, legs: Some(legs) };
@@ -588,6 +614,29 @@ mod tests {
         let own = mean_wind(&data, flown_law, flown);
         assert!((own[0] - wind_mps[0]).abs() < 0.1, "{own:?}");
         assert!(own[0] - read[0] > 0.5, "who leans more leans so in less wind: {read:?}");
+    }
+
+    #[test]
+    fn each_flight_has_the_wind_that_its_own_leans_show() {
+        let law = LeanLaw::of(&trial::vehicle(), SEA_LEVEL_DENSITY, 0.0);
+        let mut data = trial::data(1, |_, _| 0.0);
+        data.groups.push(data.groups[0].clone());
+        let winds_mps = [[0.0, 0.0], [4.0, -3.0]];
+        for (group, [x_mps, y_mps]) in data.groups.iter_mut().zip(winds_mps) {
+            for (bin, value) in group.bins.iter().zip(&mut group.measured[0]) {
+                value.lean_rad = law.lean([-x_mps, -y_mps], bin.climb_mps());
+            }
+        }
+        let together = wind(&data, law, None);
+        assert!(together.of_groups_mps.is_empty() && together.of_groups_se_mps.is_empty());
+        data.groups[1].flight = 1;
+        let apart = wind(&data, law, None);
+        for (group, [x_mps, y_mps]) in winds_mps.into_iter().enumerate() {
+            let [own_x_mps, own_y_mps] = apart.of_groups_mps[group];
+            assert!((own_x_mps - x_mps).hypot(own_y_mps - y_mps) < 1e-6, "{apart:?}");
+        }
+        let [calm_mps, windy_mps] = [0, 1].map(|group: usize| apart.of_groups_se_mps[group]);
+        assert!(calm_mps == LEAST_DOUBT_MPS && windy_mps > 1.4, "{calm_mps} {windy_mps}");
     }
 
     #[test]

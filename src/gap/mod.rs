@@ -16,6 +16,7 @@ mod drones;
 mod error;
 mod explain;
 mod filter;
+mod flights;
 mod formula;
 mod generic;
 mod gls;

@@ -248,8 +248,8 @@ fn fit_from_both(problem: &Problem<'_>, start: Hyper) -> Solution {
     if anew.log_posterior() > near.log_posterior() { anew } else { near }
 }
 
-/// What is not known exactly, as regressors of one standard deviation each: the updraft that the whole flight is
-/// in (always the first), the wind, the vehicle's form, and the forms of effects of which only the size is fitted.
+/// What is not known exactly, as regressors of one standard deviation each: the updraft that each flight is in all over (that
+/// of the first flight comes first), the wind, the vehicle's form, and the forms of effects of which only the size is fitted.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -258,7 +258,7 @@ pub(super) fn doubts(
     vehicle: &Vehicle,
     parameters: &[Parameter],
 ) -> Result<Vec<Column>, GapError> {
-    let mut doubts = vec![comparison.updraft_doubt(vehicle)?];
+    let mut doubts = comparison.updraft_doubts(vehicle)?;
     doubts.extend(comparison.wind_doubts(vehicle)?);
     doubts.extend(comparison.spread_doubts(vehicle)?);
     doubts.extend(form_doubts(&comparison.scene));

@@ -66,6 +66,7 @@ pub(super) fn data(drones: usize, more_us: impl Fn(usize, &Bin) -> f64) -> Data 
         neighbours: vec![0.0; drones],
         measured,
         armed_s: 0.0,
+        flight: 0,
     };
     Data { groups: vec![group], ..Data::default() }
 }

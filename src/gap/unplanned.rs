@@ -4,6 +4,7 @@
 
 use super::bins::{Bin, cut};
 use super::data::Flown;
+use super::flights;
 use crate::analysis::steps::steady;
 use crate::analysis::windows::inferred;
 use crate::flight::Flight;
@@ -17,12 +18,35 @@ const SAME_SHARE: f64 = 0.8;
 /// A log's command is in force for this long, s: some have it once a second.
 const IN_FORCE_S: f64 = 1.5;
 
-/// The bins of each group of logs that were told the same, and its logs.
+/// Logs that were told the same in one flight.
+#[derive(Debug, Default)]
+pub(super) struct Group<'a, 'b> {
+    /// Steady bins that they have in common.
+    pub(super) bins: Vec<Bin>,
+    /// The logs.
+    pub(super) members: Vec<&'a Flown<'b>>,
+    /// Which flight it was, counted from 0.
+    pub(super) flight: usize,
+}
+
+/// The groups of logs that were told the same, flight by flight.
+pub(super) fn groups<'a, 'b>(flown: &'a [Flown<'b>], steps: Option<&Steps>) -> Vec<Group<'a, 'b>> {
+    let flights = flights::of(flown);
+    let last = flights.iter().copied().max().unwrap_or(0);
+    let of_flight = |flight: usize| {
+        let own = flown.iter().zip(&flights).filter(move |(_, own)| **own == flight);
+        let groups = groups_of_flight(own.map(|(one, _)| one), steps);
+        groups.into_iter().map(move |(bins, members)| Group { bins, members, flight })
+    };
+    (0..=last).flat_map(of_flight).collect()
+}
+
+/// The bins of each group of logs of a flight that were told the same, and its logs.
 ///
 /// A few logs that were told otherwise than the others are drones that went home early, no group: they stay with the
 /// largest one, which says what they lack.
-pub(super) fn groups<'a, 'b>(
-    flown: &'a [Flown<'b>],
+fn groups_of_flight<'a, 'b: 'a>(
+    flown: impl Iterator<Item = &'a Flown<'b>>,
     steps: Option<&Steps>,
 ) -> Vec<(Vec<Bin>, Vec<&'a Flown<'b>>)> {
     let mut groups: Vec<(Vec<Bin>, Vec<&Flown<'_>>)> = Vec::new();
@@ -95,7 +119,7 @@ mod tests {
         let flown: Vec<Flown<'_>> =
             flights.iter().zip(1..).map(|(flight, slot)| Flown { slot, flight }).collect();
         let groups = groups(&flown, None);
-        groups.iter().map(|(_, members)| members.iter().map(|one| one.slot).collect()).collect()
+        groups.iter().map(|group| group.members.iter().map(|one| one.slot).collect()).collect()
     }
 
     const UP: [f64; 6] = [0.0, 1.0, -1.0, 0.0, 2.0, -2.0];

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::data::Data;
+use super::data::{Data, Flown};
 use super::explain::Found;
 use super::make::Input;
 use super::verdict::{Gap, is_strong_wind};
@@ -10,9 +10,12 @@ use super::words::short;
 use crate::base::said::said_in_files;
 use crate::effects::select::value_of;
 use crate::mission::plan::{Group, Plan};
+use crate::numeric::upper_median;
 
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
+/// Shares of the square in a thrust curve that differ by less are the same. Chosen: motors of one kind differ by as much.
+const SAME_EXPO: f64 = 0.05;
 
 /// Warning to the reader of a verdict. In `verdict.json` it stands as its sentence.
 #[derive(Clone, Debug)]
@@ -38,6 +41,18 @@ pub enum Warning {
         effect: String,
         /// Name of the parameter.
         parameter: String,
+    },
+    /// The measured logs are of several flights.
+    Flights {
+        /// How many.
+        flights: usize,
+    },
+    /// By the logs' parameters, autopilots count with motors of other thrust curves.
+    ThrustCurves {
+        /// `MOT_THST_EXPO` of the simulated logs.
+        simulated: f64,
+        /// `MOT_THST_EXPO` of the measured logs.
+        measured: f64,
     },
     /// The measured drones leaned differently from those of another program's simulation.
     OtherWind {
@@ -134,6 +149,19 @@ impl fmt::Display for Warning {
                  and vertical flight: the two sides flew in different wind, and nothing is named that this \
                  explains"
             ),
+            Self::Flights { flights } => write!(
+                f,
+                "the measured logs are of {flights} flights: each has its own air and wind, and what is named \
+                 holds in all of them"
+            ),
+            Self::ThrustCurves { simulated, measured } => write!(
+                f,
+                "thrust-curve: the logs' own parameters say that the motors differ (MOT_THST_EXPO is {} in the \
+                 simulated logs and {} in the measured ones); in steady climbs that looks like more or less drag, \
+                 and what this flight shows of it may be in the sizes of other effects",
+                short(*simulated),
+                short(*measured)
+            ),
             Self::LeftOver { left_us, floor_us, reduced_chi2, in_strong_wind } => {
                 write!(
                     f,
@@ -229,6 +257,13 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
             });
         }
     }
+    let flights = data.flights();
+    if flights > 1 {
+        warnings.push(Warning::Flights { flights });
+    }
+    if let Some((simulated, measured)) = thrust_curves(input) {
+        warnings.push(Warning::ThrustCurves { simulated, measured });
+    }
     if input.simulated.is_some() && found.comparison.is_in_other_wind() {
         let lean_deg = found.comparison.apart_rad().to_degrees();
         warnings.push(Warning::OtherWind { lean_deg });
@@ -247,6 +282,15 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// `MOT_THST_EXPO` of the simulated and of the measured logs, where they differ.
+fn thrust_curves(input: &Input<'_>) -> Option<(f64, f64)> {
+    let usual = |flown: &[Flown<'_>]| {
+        upper_median(flown.iter().filter_map(|one| one.flight.thrust_expo).collect())
+    };
+    let (simulated, measured) = (usual(input.simulated?)?, usual(input.flown)?);
+    ((simulated - measured).abs() > SAME_EXPO).then_some((simulated, measured))
 }
 
 /// Groups of a plan of which no drone is compared.

@@ -123,6 +123,14 @@ fn flew_in_other_wind(verdict: &Verdict) -> bool {
     verdict.cautions.iter().any(|caution| matches!(caution, Warning::OtherWind { .. }))
 }
 
+/// The thrust curves that the logs of both sides say, where they differ.
+fn thrust_curves(verdict: &Verdict) -> Option<(f64, f64)> {
+    verdict.cautions.iter().find_map(|caution| match caution {
+        Warning::ThrustCurves { simulated, measured } => Some((*simulated, *measured)),
+        _ => None,
+    })
+}
+
 /// What explains more than chance does, and was not taken; empty: nothing does.
 fn too_little(rest: &Rest) -> String {
     if rest.gain_nats <= rest.threshold_nats {
@@ -161,6 +169,14 @@ pub fn summary(verdict: &Verdict) -> String {
         let named: Vec<String> = verdict.steps.iter().map(phrase).collect();
         format!("The model lacks {}.", named.join("; and "))
     };
+    if let Some((simulated, measured)) = thrust_curves(verdict) {
+        let _ = write!(
+            text,
+            " By the logs' own parameters the two sides differ in thrust-curve as well (MOT_THST_EXPO {} and {}).",
+            short(simulated),
+            short(measured)
+        );
+    }
     if verdict.sensor.named {
         let but = if verdict.steps.is_empty() { " But the" } else { " The" };
         let effect = Role::SensorBias.place().map_or("", |place| place.name());

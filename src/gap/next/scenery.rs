@@ -86,6 +86,8 @@ impl<'a> Scenery<'a> {
         let groups = &comparison.data.groups;
         let wind = Wind {
             mean_mps: known.wind_mps,
+            of_groups_mps: Vec::new(),
+            of_groups_se_mps: Vec::new(),
             mean_se_mps: told_within_mps(&comparison.data, known.wind_mps),
             air_mps: groups.iter().map(|group| group.bins.iter().map(air).collect()).collect(),
             measured: None,

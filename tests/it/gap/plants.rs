@@ -51,3 +51,42 @@ fn what_two_plants_differ_in_is_named_though_it_is_several_things() {
     let us = |side: &str| gap[side]["value"].as_f64().unwrap();
     assert!(us("after_us") < 0.1 * us("before_us"), "{gap}");
 }
+
+#[test]
+fn two_flights_of_the_firmware_in_still_air_and_in_wind_name_what_both_have() {
+    let bench = Bench::new();
+    let logs = bench.path("logs");
+    std::fs::create_dir(&logs).unwrap();
+    for name in ["ladder-still.trimmed.BIN", "ladder-wind5.trimmed.BIN"] {
+        std::fs::copy(fixture(name), logs.join(name)).unwrap();
+    }
+    let simulated = fixture("square-law-ladder.trimmed.BIN");
+    let args = [
+        "gap",
+        "--measured",
+        "logs",
+        "--simulated",
+        simulated.to_str().unwrap(),
+        "-o",
+        "gap",
+        "--json",
+    ];
+    let verdict = &bench.expect(0, &args).json("updraft.gap/1")["verdict"];
+    assert_eq!(verdict["data"]["groups"].to_string(), r#"[["flight 1",1],["flight 2",1]]"#);
+    let steps = verdict["steps"].as_array().unwrap();
+    let named: Vec<Option<&str>> =
+        steps.iter().map(|step| step["finding"]["effect"].as_str()).collect();
+    assert_eq!(named, [Some("face-drag"), Some("momentum-drag")], "{verdict}");
+    // The wind that only one flight had explains none of it.
+    let cautions = verdict["cautions"].to_string();
+    assert!(cautions.contains("the measured logs are of 2 flights"), "{cautions}");
+    assert!(cautions.contains("flew in different wind"), "{cautions}");
+    let summary = verdict["summary"].as_str().unwrap();
+    assert!(
+        summary.contains("differ in thrust-curve as well (MOT_THST_EXPO 0 and 0.500)"),
+        "{summary}"
+    );
+    let gap = &verdict["gap"]["rungs"];
+    let us = |side: &str| gap[side].as_f64().unwrap();
+    assert!(us("after_without_air_us") < 0.1 * us("before_without_air_us"), "{gap}");
+}
