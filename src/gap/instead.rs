@@ -94,13 +94,17 @@ pub(super) fn fewer_instead(
     Ok(found)
 }
 
+/// An effect with which the model as it is comes so much nearer to the logs need not explain more than any other: what else
+/// explains them is that nearly all of a doubted wind was misread. Chosen.
+const MUCH_NEARER: f64 = 0.5;
 /// Drags by which a drone reads another wind from its leans.
 const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 
 /// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
 /// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag explains
 /// enough to be named and moves the pulse by too little; and a shape of the climb that could
-/// not be taken in may be an effect in another updraft. `flown` searches with these options, and `rest` looks for what is left.
+/// not be taken in may be an effect in another updraft. An effect with which the raw gap falls by half need not explain it
+/// clearly better. `flown` searches with these options, and `rest` looks for what is left.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
@@ -125,12 +129,18 @@ pub(super) fn effect_after_all(
     add_new(&mut effects, shapes().filter(|name| is_left && depends_on_climb(name)));
     let bins = comparison.data.bins_of_groups();
     let price_nats = if is_left { FREE_FLOOR_NATS } else { FLOOR_NATS };
-    let (updraft_mps, beaten_nats) = (found.updraft_mps, found.explains()? + price_nats);
+    let (updraft_mps, without_nats) = (found.updraft_mps, found.explains()?);
+    let raw_us = comparison.raw_gap_us()?;
     let ended = |effect: &&'static str| {
-        let only = Only { effect, updraft_mps, beaten_nats };
+        let only = Only { effect, updraft_mps, beaten_nats: without_nats + price_nats };
         Ended::of(&alone(options, only), &bins, &flown)
     };
-    let better = effects.par_iter().filter_map(ended).filter(|it| it.nats > beaten_nats);
+    let is_better = |it: &Ended| {
+        let with_us = it.found.comparison.raw_gap_us();
+        let is_nearer = with_us.is_ok_and(|with_us| with_us < MUCH_NEARER * raw_us);
+        it.nats > without_nats + if is_nearer { 0.0 } else { price_nats }
+    };
+    let better = effects.par_iter().filter_map(ended).filter(is_better);
     let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
     match best {
         Some(Ended { only: Some(only), left: Some(left), .. }) => {

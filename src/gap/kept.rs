@@ -18,6 +18,9 @@ const WORSE: f64 = 1.01;
 
 /// A raw gap that is smaller is a small one, us: what matters for the pulse, 0.1 m/s of air.
 const SMALL_US: f64 = 2.5;
+/// A raw gap below this is one in which something unknown that matters would show, us: what moves the pulse by
+/// [`SMALL_US`] makes it larger by half of that.
+const QUIET_US: f64 = 5.0;
 /// What moves the pulse by less does not matter in the quietest flight, us (rms).
 const HARDLY_US: f64 = 0.75;
 
@@ -201,7 +204,8 @@ fn is_as_small(with: &Gap, without: &Gap) -> bool {
     let raw_us = |gap: &Gap| [gap.drones, gap.rungs].map(|one| one.map(|one| one.after_us.value));
     let is = |(with, without): (Option<f64>, Option<f64>)| match (with, without) {
         (Some(with), Some(without)) => {
-            without < SMALL_US && without * without < with * with + HARDLY_US * HARDLY_US
+            let is_hardly_larger = without * without < with * with + HARDLY_US * HARDLY_US;
+            without < SMALL_US && is_hardly_larger || without < QUIET_US && without <= with
         }
         (None, None) => true,
         _ => false,
@@ -295,6 +299,8 @@ mod tests {
         assert!(is_as_small(&gap(1.0, 1.1), &gap(1.0, 1.2)));
         assert!(!is_as_small(&gap(1.0, 1.1), &gap(1.0, 1.6)), "the rungs need it");
         assert!(!is_as_small(&gap(1.0, 1.1), &gap(1.6, 1.1)), "the drones need it");
+        assert!(is_as_small(&gap(3.3, 3.8), &gap(2.9, 3.5)), "the drones are nearer without");
+        assert!(!is_as_small(&gap(3.3, 3.8), &gap(2.9, 3.9)), "the rungs are not");
         assert!(!is_as_small(&gap(6.0, 6.0), &gap(6.0, 6.0)), "of much air nobody can tell");
         assert!(!is_as_small(&Gap::default(), &Gap::default()));
         assert!(!is_as_small(&gap(1.0, 1.0), &Gap::default()));

@@ -213,3 +213,36 @@ pub fn summary(verdict: &Verdict) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_explains_more_than_chance_does_and_is_not_taken_is_said() {
+        let left = |gain_nats: f64| {
+            let rest = Rest {
+                gain_nats,
+                candidate: "climb".to_owned(),
+                threshold_nats: 8.0,
+                reduced_chi2: 1.0,
+            };
+            summary(&Verdict { rest, ..Verdict::default() })
+        };
+        assert!(!left(7.9).contains("more than chance"), "{}", left(7.9));
+        let said = left(8.1);
+        assert!(said.starts_with("Nothing is missing"), "{said}");
+        assert!(said.ends_with("moves the pulse by too little, or as the air may."), "{said}");
+    }
+
+    #[test]
+    fn thrust_curves_that_the_logs_parameters_tell_are_named() {
+        let cautions = vec![Warning::ThrustCurves { simulated: 0.0, measured: 0.5 }];
+        let said = summary(&Verdict { cautions, ..Verdict::default() });
+        assert!(
+            said.contains("differ in thrust-curve as well (MOT_THST_EXPO 0 and 0.500)"),
+            "{said}"
+        );
+        assert!(!summary(&Verdict::default()).contains("thrust-curve"));
+    }
+}

@@ -141,7 +141,23 @@ fn best_name(round: &Round, sought: Sought<'_>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::trial;
     use super::*;
+
+    #[test]
+    fn the_same_unknown_is_told_once() {
+        let unknown = |depends_on| Finding::Unknown { depends_on, formula: None };
+        let told = |depends_on, nats| trial::step(unknown(depends_on), nats, &[]);
+        let mut steps = vec![
+            told(Dependence::Climb, 30.0),
+            trial::step(trial::name("battery"), 25.0, &[]),
+            told(Dependence::Time, 20.0),
+            told(Dependence::Climb, 12.0),
+        ];
+        unknowns_once(&mut steps);
+        let nats: Vec<f64> = steps.iter().map(|step| step.gain_nats).collect();
+        assert_eq!(nats, [30.0, 25.0, 20.0], "the first of each");
+    }
 
     #[test]
     fn a_curve_is_smoother_along_what_it_depends_on() {
