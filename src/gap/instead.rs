@@ -101,8 +101,8 @@ const MUCH_NEARER: f64 = 0.5;
 const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 
 /// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
-/// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag explains
-/// enough to be named and moves the pulse by too little; and a shape of the climb that could
+/// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag, or an effect of
+/// the climb, explains enough to be named and moves the pulse by too little; and a shape of the climb that could
 /// not be taken in may be an effect in another updraft. An effect with which the raw gap falls by half need not explain it
 /// clearly better. `flown` searches with these options, and `rest` looks for what is left.
 ///
@@ -118,8 +118,10 @@ pub(super) fn effect_after_all(
     let wind = &comparison.wind;
     let passes = end.gain_nats > end.threshold_nats;
     let reads_wind = WIND_READERS.iter().any(|role| role.is_of(&end.candidate));
-    let is_misread =
-        wind.measured.is_none() && (is_strong_wind(wind.mean_mps) || passes && reads_wind);
+    let is_of_climb =
+        find(&end.candidate).is_some_and(|one| depends_on_climb(one.definition().name));
+    let is_misread = wind.measured.is_none()
+        && (is_strong_wind(wind.mean_mps) || passes && (reads_wind || is_of_climb));
     let is_left = passes && Dependence::of(&end.candidate) == Some(Dependence::Climb);
     if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
         return Ok(found);
