@@ -13,7 +13,7 @@ use super::error::GapError;
 use super::explain::{Found, Left, Only, Options, Searched, Setting};
 use super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
 use super::verdict::{Finding, Step, is_strong_wind};
-use crate::effects::{Class, LIBRARY, Role, Signal, Sought, find};
+use crate::effects::{Class, Definition, LIBRARY, Role, Signal, Sought, find};
 
 /// Effects that are flown in place of what was found, at most. Chosen to bound the time.
 const MOST: usize = 5;
@@ -118,10 +118,9 @@ pub(super) fn effect_after_all(
     let wind = &comparison.wind;
     let passes = end.gain_nats > end.threshold_nats;
     let reads_wind = WIND_READERS.iter().any(|role| role.is_of(&end.candidate));
-    let is_of_climb =
-        find(&end.candidate).is_some_and(|one| depends_on_climb(one.definition().name));
+    let is_like_drag = find(&end.candidate).is_some_and(|one| is_of_climb(one.definition()));
     let is_misread = wind.measured.is_none()
-        && (is_strong_wind(wind.mean_mps) || passes && (reads_wind || is_of_climb));
+        && (is_strong_wind(wind.mean_mps) || passes && (reads_wind || is_like_drag));
     let is_left = passes && Dependence::of(&end.candidate) == Some(Dependence::Climb);
     if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
         return Ok(found);
@@ -138,9 +137,8 @@ pub(super) fn effect_after_all(
         Ended::of(&alone(options, only), &bins, &flown)
     };
     let is_better = |it: &Ended| {
-        let with_us = it.found.comparison.raw_gap_us();
-        let is_nearer = with_us.is_ok_and(|with_us| with_us < MUCH_NEARER * raw_us);
-        it.nats > without_nats + if is_nearer { 0.0 } else { price_nats }
+        let with_us = it.found.comparison.raw_gap_us().unwrap_or(f64::INFINITY);
+        it.nats > without_nats + further_price_nats([raw_us, with_us], price_nats)
     };
     let better = effects.par_iter().filter_map(ended).filter(is_better);
     let best = better.reduce_with(|one, other| if other.nats > one.nats { other } else { one });
@@ -151,6 +149,16 @@ pub(super) fn effect_after_all(
         Some(best) => Ok(best.found),
         None => Ok(found),
     }
+}
+
+/// What an effect must explain beyond its own price to stand in place of nothing, nats, where it changes the raw gap so, us.
+fn further_price_nats([without_us, with_us]: [f64; 2], price_nats: f64) -> f64 {
+    if with_us < MUCH_NEARER * without_us { 0.0 } else { price_nats }
+}
+
+/// Whether an effect is one of the climb: a battery's load grows in a climb, and yet it goes with time.
+fn is_of_climb(effect: &Definition) -> bool {
+    depends_on_climb(effect.name) && effect.class != Class::TimeDrift
 }
 
 /// Options of a search for one effect alone.
@@ -188,14 +196,11 @@ fn rivals(steps: &[Step], by_leans: bool) -> Vec<&'static str> {
         })
         .collect();
     // Of the climb alone, any effect may explain little in this updraft and all in one of its own.
-    let is_of_climb = |step: &Step| {
+    let begins_with_climb = |step: &Step| {
         let first = step.finding.effects().first().and_then(|name| find(name));
-        first.is_some_and(|effect| {
-            let known = effect.definition();
-            depends_on_climb(known.name) && known.class != Class::TimeDrift
-        })
+        first.is_some_and(|effect| is_of_climb(effect.definition()))
     };
-    if unknown.contains(&Dependence::Climb) || steps.iter().any(is_of_climb) {
+    if unknown.contains(&Dependence::Climb) || steps.iter().any(begins_with_climb) {
         add_new(&mut names, shapes().filter(|name| depends_on_climb(name)));
     }
     // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
@@ -539,6 +544,14 @@ mod tests {
         );
         assert!(!told(20.0, 5.0, ("parasitic-drag", 7.0), &options), "chance explains as much");
         assert!(!told(20.0, 5.0, ("battery", 9.3), &options), "nobody reads a wind by it");
+        assert!(told(20.0, 5.0, ("rotor-inflow", 9.3), &options), "in the climb it is like a drag");
+    }
+
+    #[test]
+    fn what_brings_the_model_much_nearer_has_no_further_price() {
+        assert_eq!(further_price_nats([23.9, 9.4], 8.0), 0.0);
+        assert_eq!(further_price_nats([23.9, 12.0], 8.0), 8.0);
+        assert_eq!(further_price_nats([23.9, f64::INFINITY], 8.0), 8.0, "unknown");
     }
 
     #[test]
