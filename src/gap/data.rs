@@ -28,6 +28,10 @@ const SAME_HEIGHT_M: f64 = 5.0;
 /// group: some bins are lost to gaps and limits. Chosen.
 const AS_GOOD: f64 = 0.95;
 
+/// A flight of which there are so many times fewer logs than of the largest is none to compare. Chosen: a fleet that flies again has
+/// most of its drones.
+const FEW_OF: usize = 4;
+
 /// Log of one drone, with its slot.
 #[derive(Debug)]
 pub struct Flown<'a> {
@@ -147,7 +151,8 @@ impl Data {
     /// or, of a table that has none, from its velocity.
     pub fn of_logs(flown: &[Flown<'_>], steps: Option<&Steps>, thrust_exponent: f64) -> Self {
         let mut data = Self::default();
-        let groups = unplanned::groups(flown, steps);
+        let (groups, strays) = without_strays(unplanned::groups(flown, steps));
+        data.left_out = strays;
         let last_flight = groups.iter().map(|group| group.flight).max().unwrap_or(0);
         for (index, group) in groups.iter().enumerate() {
             let unplanned::Group { bins, members, flight } = group;
@@ -406,6 +411,29 @@ fn resistance_ohm(flown: &[Flown<'_>]) -> Option<f64> {
     upper_median(known.filter(|ohm| *ohm > 0.0 && *ohm < 1.0).collect())
 }
 
+/// The groups without those of flights that few logs are of: cards that nobody had cleared, not a flight that was repeated.
+fn without_strays<'a, 'b>(
+    groups: Vec<unplanned::Group<'a, 'b>>,
+) -> (Vec<unplanned::Group<'a, 'b>>, Vec<LeftOut>) {
+    let logs = |flight: usize| -> usize {
+        let own = groups.iter().filter(|group| group.flight == flight);
+        own.map(|group| group.members.len()).sum()
+    };
+    let most = groups.iter().map(|group| logs(group.flight)).max().unwrap_or(0);
+    let is_stray: Vec<bool> =
+        groups.iter().map(|group| FEW_OF * logs(group.flight) < most).collect();
+    let (mut kept, mut strays) = (Vec::new(), Vec::new());
+    for (group, is_stray) in groups.into_iter().zip(is_stray) {
+        if is_stray {
+            let slots = group.members.iter().map(|one| one.slot);
+            strays.extend(slots.map(|slot| LeftOut::OtherFlight { slot }));
+        } else {
+            kept.push(group);
+        }
+    }
+    (kept, strays)
+}
+
 /// When the first of the drones armed, show time, s; infinity if none did.
 fn first_armed_s<'a>(flights: impl Iterator<Item = &'a Flight>) -> f64 {
     let armed = flights.filter_map(|flight| flight.armed_s.first());
@@ -490,6 +518,27 @@ mod tests {
         assert_eq!(found_ohm(&[0.02, 1.5, 0.03, 0.0, 0.04]), Some(0.03));
         assert_eq!(found_ohm(&[1.5, 0.0]), None);
         assert_eq!(found_ohm(&[]), None);
+    }
+
+    #[test]
+    fn a_card_that_nobody_had_cleared_is_no_flight() {
+        let flights: Vec<Flight> = (0..11).map(|_| Flight::default()).collect();
+        let flown: Vec<Flown<'_>> =
+            flights.iter().zip(1..).map(|(flight, slot)| Flown { slot, flight }).collect();
+        let kept_of = |counts: [usize; 2]| {
+            let mut logs = flown.iter();
+            let groups = counts.into_iter().enumerate().map(|(flight, count)| {
+                let members = logs.by_ref().take(count).collect();
+                unplanned::Group { bins: Vec::new(), members, flight }
+            });
+            let (kept, strays) = without_strays(groups.collect());
+            (kept.len(), strays.iter().map(ToString::to_string).collect::<Vec<_>>())
+        };
+        assert_eq!(kept_of([1, 1]), (2, Vec::new()), "a flight that was repeated");
+        assert_eq!(kept_of([2, 8]), (2, Vec::new()));
+        let said = "slot 1: its log is of another flight than nearly all others".to_owned();
+        assert_eq!(kept_of([1, 8]), (1, vec![said]));
+        assert_eq!(kept_of([0, 0]), (2, Vec::new()));
     }
 
     #[test]

@@ -24,6 +24,11 @@ pub enum LeftOut {
         /// Number of steady bins.
         bins: usize,
     },
+    /// The log is of another flight than nearly all others.
+    OtherFlight {
+        /// Slot of the drone.
+        slot: u16,
+    },
     /// The pulse never changes.
     ConstantPulse {
         /// Slot of the drone.
@@ -54,6 +59,9 @@ impl fmt::Display for LeftOut {
                 "slot {slot}: only {usable} of {bins} steady bins are usable (gaps in the log, motors at \
                  a limit, or another flight)"
             ),
+            Self::OtherFlight { slot } => {
+                write!(f, "slot {slot}: its log is of another flight than nearly all others")
+            }
             Self::ConstantPulse { slot, pulse_us } => write!(
                 f,
                 "slot {slot}: its pulse is {pulse_us:.0} us in the whole flight: no rotor flies so"
