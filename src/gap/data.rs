@@ -71,7 +71,7 @@ pub struct Group {
     pub measured: Vec<Vec<BinValues>>,
     /// Show time at which the motors started, s (earliest of the drones).
     pub armed_s: f64,
-    /// Which flight it flew in, counted from 0: groups of one flight share their air and wind.
+    /// Number of the flight that it flew in, counted from 0: groups of one flight share their air and wind.
     pub flight: usize,
 }
 

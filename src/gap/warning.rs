@@ -8,6 +8,7 @@ use super::make::Input;
 use super::verdict::{Gap, is_strong_wind};
 use super::words::short;
 use crate::base::said::said_in_files;
+use crate::effects::Role;
 use crate::effects::select::value_of;
 use crate::mission::plan::{Group, Plan};
 use crate::numeric::upper_median;
@@ -156,9 +157,10 @@ impl fmt::Display for Warning {
             ),
             Self::ThrustCurves { simulated, measured } => write!(
                 f,
-                "thrust-curve: the logs' own parameters say that the motors differ (MOT_THST_EXPO is {} in the \
+                "{}: the logs' own parameters say that the motors differ (MOT_THST_EXPO is {} in the \
                  simulated logs and {} in the measured ones); in steady climbs that looks like more or less drag, \
                  and what this flight shows of it may be in the sizes of other effects",
+                thrust_curve(),
                 short(*simulated),
                 short(*measured)
             ),
@@ -282,6 +284,11 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// Name of the effect that a thrust curve is.
+pub(super) fn thrust_curve() -> &'static str {
+    Role::ThrustExpo.place().map_or("", |place| place.name())
 }
 
 /// `MOT_THST_EXPO` of the simulated and of the measured logs, where they differ.

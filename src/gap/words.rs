@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::dependence::Dependence;
 use super::verdict::{Finding, Fitted, Form, Rest, Step, Verdict, is_strong_wind};
-use super::warning::Warning;
+use super::warning::{Warning, thrust_curve};
 use crate::effects::Role;
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
@@ -172,7 +172,8 @@ pub fn summary(verdict: &Verdict) -> String {
     if let Some((simulated, measured)) = thrust_curves(verdict) {
         let _ = write!(
             text,
-            " By the logs' own parameters the two sides differ in thrust-curve as well (MOT_THST_EXPO {} and {}).",
+            " By the logs' own parameters the two sides differ in {} as well (MOT_THST_EXPO {} and {}).",
+            thrust_curve(),
             short(simulated),
             short(measured)
         );

@@ -32,6 +32,8 @@ pub enum Role {
     WindLift,
     /// Part of what horizontal air gives that goes with the square of its speed.
     WindLiftSquare,
+    /// Share of the square in thrust as a curve over the command.
+    ThrustExpo,
     /// Standard deviation of mass between drones, relative.
     MassSpread,
     /// Standard deviation of thrust at one pulse between drones, relative.
@@ -146,7 +148,7 @@ impl Role {
 mod tests {
     use super::*;
 
-    const ONCE: [Role; 26] = [
+    const ONCE: [Role; 27] = [
         Role::BodyDragTop,
         Role::BodyDragSide,
         Role::RotorDrag,
@@ -157,6 +159,7 @@ mod tests {
         Role::InflowShare,
         Role::WindLift,
         Role::WindLiftSquare,
+        Role::ThrustExpo,
         Role::MassSpread,
         Role::ThrustSpread,
         Role::InflowSpread,

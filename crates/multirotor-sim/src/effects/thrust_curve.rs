@@ -1,7 +1,7 @@
 //! The motor controller's curve from command to thrust is not the model's.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, InFlight, Reference, Signals, Start};
+use super::{Effect, InFlight, Reference, Role, Signals, Start};
 use crate::vehicle::{Airframe, RotorLaw, Vehicle};
 
 const EXPO: usize = 0;
@@ -64,7 +64,7 @@ impl Effect for ThrustCurve {
                 low: -0.5,
                 high: 1.0,
                 default: |vehicle| vehicle.autopilot.mot_thst_expo.clamp(0.0, 1.0),
-                role: None,
+                role: Some(Role::ThrustExpo),
             }],
             hooks: &[Hook::Command],
             shown: (Signal::ModelIncrement, -100.0, 100.0),
