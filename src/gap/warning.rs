@@ -45,7 +45,7 @@ pub enum Warning {
     },
     /// The measured logs are of several flights.
     Flights {
-        /// How many.
+        /// Number of flights that they are of.
         flights: usize,
     },
     /// By the logs' parameters, autopilots count with motors of other thrust curves.
