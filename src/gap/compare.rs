@@ -1,7 +1,6 @@
 //! One comparison: the measured side, the simulated side, and the residual for any vehicle.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
@@ -646,14 +645,13 @@ impl Comparison {
         let (more, less) = (at(UPDRAFT_STEP_MPS)?, at(-UPDRAFT_STEP_MPS)?);
         let per_doubt = UPDRAFT_DOUBT_MPS / (2.0 * UPDRAFT_STEP_MPS);
         let change = more.less(&less);
-        let flights: BTreeSet<usize> = self.data.groups.iter().map(|group| group.flight).collect();
         let of_flight = |flight: usize| {
             change.each(|group, drone, bin| {
                 let is_own = self.data.groups[group].flight == flight;
                 if is_own { per_doubt * change.at(group, drone, bin) } else { 0.0 }
             })
         };
-        Ok(flights.into_iter().map(of_flight).collect())
+        Ok(self.data.flights().into_iter().map(of_flight).collect())
     }
 
     /// What more wind along an axis of the show does to the vehicle's closed form, us.

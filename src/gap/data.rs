@@ -153,7 +153,7 @@ impl Data {
         let mut data = Self::default();
         let (groups, strays) = without_strays(unplanned::groups(flown, steps));
         data.left_out = strays;
-        let last_flight = groups.iter().map(|group| group.flight).max().unwrap_or(0);
+        let flights: BTreeSet<usize> = groups.iter().map(|group| group.flight).collect();
         for (index, group) in groups.iter().enumerate() {
             let unplanned::Group { bins, members, flight } = group;
             let values = members
@@ -162,9 +162,9 @@ impl Data {
                 .collect();
             let armed_s = first_armed_s(members.iter().map(|one| one.flight));
             let of_flight = groups.iter().filter(|other| other.flight == *flight).count();
-            let name = match (groups.len(), last_flight, of_flight) {
+            let name = match (groups.len(), flights.len(), of_flight) {
                 (1, ..) => "all".to_owned(),
-                (_, 0, _) => format!("group {}", index + 1),
+                (_, 1, _) => format!("group {}", index + 1),
                 (.., 1) => format!("flight {}", flight + 1),
                 _ => format!("flight {}, group {}", flight + 1, index + 1),
             };
@@ -327,10 +327,9 @@ impl Data {
         last
     }
 
-    /// Number of flights that its groups flew in.
-    pub(super) fn flights(&self) -> usize {
-        let flights: BTreeSet<usize> = self.groups.iter().map(|group| group.flight).collect();
-        flights.len()
+    /// The flights that its groups flew in, in order.
+    pub(super) fn flights(&self) -> BTreeSet<usize> {
+        self.groups.iter().map(|group| group.flight).collect()
     }
 
     /// Number of drones in all groups.

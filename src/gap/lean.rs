@@ -345,7 +345,7 @@ pub(super) fn wind_by(
 
 /// The mean wind of the flight that each group flew in, by a law, m/s; empty: there is one flight.
 fn of_flights(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw) -> Vec<[f64; 2]> {
-    if data.flights() < 2 {
+    if data.flights().len() < 2 {
         return Vec::new();
     }
     let of_group = |group: &Group| {

@@ -259,7 +259,7 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
             });
         }
     }
-    let flights = data.flights();
+    let flights = data.flights().len();
     if flights > 1 {
         warnings.push(Warning::Flights { flights });
     }
