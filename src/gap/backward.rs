@@ -29,6 +29,8 @@ fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
 /// below the z = 4 of naming (docs/physics.md, 3.3), so that chance does not remove what was just named. Not
 /// measured.
 const KEPT_Z: f64 = 3.0;
+/// Standard errors within which a size is what the model had: half of a 95 % interval.
+const SAME_Z: f64 = 1.96;
 /// Share of an effect's trace that its form may be off by: other forms of the same physics (a linear inflow, a round
 /// body's drag) left a second effect of a few hundredths. Chosen, three times the error of sizes in
 /// [`super::refine`].
@@ -82,6 +84,20 @@ impl Found {
         Ok(worst.map(|(effect, _)| effect).or_else(|| within_the_form(&traces)))
     }
 
+    /// The effect that was found last, if the model had it already and what was fitted of it is what it had: beside what was found
+    /// before, it is another form of what is there, and no other size.
+    pub(super) fn same_as_before(&self) -> Option<&'static str> {
+        let [_, .., last] = &self.steps[..] else { return None };
+        let effect = last.finding.effects().first().copied()?;
+        let all = self.parameters.iter().zip(&self.values);
+        let of_it: Vec<_> = all.filter(|(one, _)| one.effect == effect).collect();
+        let is_same = |(one, (value, se)): &(&Parameter, &(f64, f64))| {
+            one.before.is_some_and(|before| (value - before).abs() < SAME_Z * se)
+        };
+        let (first, _) = of_it.first()?;
+        of_it.iter().all(is_same).then_some(first.effect)
+    }
+
     /// Takes an effect back: the model has it as it was.
     pub(super) fn drop_effect(&mut self, effect: &str, original: &Vehicle) {
         self.vehicle = taken_back(&self.vehicle, effect, original);
@@ -93,6 +109,34 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_later_finding_of_the_size_that_the_model_had_is_none() {
+        use super::super::trial::{self, name};
+        let data = trial::data(2, |_, _| 0.0);
+        let found = |values: &[(f64, f64)], before: Option<f64>, earlier: usize| {
+            let mut found = Found::nothing(trial::comparison(&data));
+            let unknown = name("battery");
+            found.steps.extend((0..earlier).map(|_| trial::step(unknown.clone(), 20.0, &[])));
+            found.steps.push(trial::step(name("rotor-inflow"), 14.4, &[]));
+            let of = |name: &'static str| Parameter {
+                effect: "rotor-inflow",
+                name,
+                unit: "",
+                bounds: (0.0, 1.0),
+                before,
+            };
+            found.parameters = ["inflow_share", "induced"].map(of)[..values.len()].to_vec();
+            found.values = values.to_vec();
+            found.same_as_before()
+        };
+        assert_eq!(found(&[(0.397, 0.05)], Some(0.402), 1), Some("rotor-inflow"));
+        assert_eq!(found(&[(0.397, 0.05)], Some(0.402), 0), None, "all that was found");
+        assert_eq!(found(&[(0.397, 0.002)], Some(0.402), 1), None, "another size");
+        assert_eq!(found(&[(0.4, 0.05), (0.9, 0.05)], Some(0.402), 1), None, "one is another");
+        assert_eq!(found(&[(0.397, 0.05)], None, 1), None, "new");
+        assert_eq!(found(&[], Some(0.402), 1), None);
+    }
 
     #[test]
     fn what_is_within_a_tenth_of_its_like_is_its_form() {

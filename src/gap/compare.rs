@@ -849,8 +849,8 @@ fn rectified(
     if gusts_mps <= 0.0 {
         return Ok(scene.signals.iter().map(|group| vec![0.0; group.len()]).collect());
     }
-    let pulses_us = scene.shifted(vehicle, NODES.map(|(node, _)| -node * gusts_mps))?;
-    let bent = |pulses_us: &[f64; NODES.len()]| {
+    let pulses_us = scene.shifted(vehicle, &NODES.map(|(node, _)| -node * gusts_mps))?;
+    let bent = |pulses_us: &Vec<f64>| {
         let nodes = NODES.iter().zip(pulses_us);
         nodes.map(|((_, weight), pulse_us)| weight * pulse_us).sum::<f64>() - pulses_us[MIDDLE]
     };

@@ -415,6 +415,7 @@ impl Search<'_> {
         }
         self.fly_again()?;
         self.chooses_form()?;
+        self.takes_back_the_same()?;
         Ok(Taken::Yes)
     }
 
@@ -541,6 +542,19 @@ impl Search<'_> {
             self.found.drop_effect(gone, self.vehicle);
             self.refused.push(gone);
             self.comparison = self.against_model()?;
+            self.found.refit(&self.comparison)?;
+        }
+        self.found.comparison = self.comparison.clone();
+        Ok(())
+    }
+
+    /// Takes back what was found last if the model had it in that size.
+    fn takes_back_the_same(&mut self) -> Result<(), GapError> {
+        let Some(same) = self.found.same_as_before() else { return Ok(()) };
+        self.found.drop_effect(same, self.vehicle);
+        self.refused.push(same);
+        self.comparison = self.against_model()?;
+        if !self.found.parameters.is_empty() {
             self.found.refit(&self.comparison)?;
         }
         self.found.comparison = self.comparison.clone();

@@ -6,6 +6,7 @@ use super::error::GapError;
 use super::explain::{Found, Options, Setting, lacked_drag, settle};
 use super::heldout::Case;
 use super::instead::{effect_after_all, fewer_instead};
+use super::lean_channel::may_lack_drag;
 use super::model_flights::ModelFlights;
 use super::search::FAR_NATS;
 use super::verdict::{Finding, Gap, Step};
@@ -92,7 +93,8 @@ impl Question<'_> {
         }
         let before = found.steps.clone();
         if !found.steps.is_empty() {
-            let by_leans = lacked_drag([self.original, self.repaired]);
+            let by_leans = lacked_drag([self.original, self.repaired])
+                || may_lack_drag(&found.comparison, self.repaired);
             found = fewer_instead(found, self.options, by_leans, setting)?;
             if found.steps != before {
                 gap = self.case(&found).gap(train, held)?;

@@ -3,7 +3,7 @@
 
 use super::compare::Comparison;
 use super::decide::CLASS_NATS;
-use super::lean::LeanLaw;
+use super::lean::{LeanLaw, Measured};
 use super::lean_fit::Body;
 use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
@@ -23,6 +23,9 @@ const FORM: f64 = 0.001;
 /// Standard errors from which a difference is named: those of [`super::detectable`], at which an effect is
 /// found nearly always. Chosen.
 const NAMED_Z: f64 = 5.0;
+
+/// Standard errors from which a difference is looked into, if it is not named. Chosen: chance does as much once in 700 flights.
+const HINT_Z: f64 = 3.0;
 
 /// Air speed of a leg, m/s: those of the templates.
 const LEG_MPS: f64 = 3.0;
@@ -76,6 +79,17 @@ fn widened(of: Interval, measured: LeanLaw) -> Interval {
 pub(super) fn alike() -> Vec<String> {
     let both = [Role::RotorDrag, Role::MomentumDrag];
     both.iter().filter_map(|role| Some(role.place()?.name().to_owned())).collect()
+}
+
+/// Whether legs tell more drag than a model has, if not so much that it is named: then a drag of the rotors may stand behind
+/// what the pulse tells.
+pub(super) fn may_lack_drag(comparison: &Comparison, model: &Vehicle) -> bool {
+    let model = LeanLaw::of(model, SEA_LEVEL_DENSITY, 0.0).linear;
+    let more = |measured: Measured| {
+        let se = measured.linear_se.hypot(FORM);
+        measured.law.linear - model > HINT_Z * se
+    };
+    comparison.wind.measured.is_some_and(more)
 }
 
 /// Drag that the model lacks, or has with another size: a class, because leans do not tell its kind.

@@ -69,6 +69,23 @@ impl<T: Clone> Memory<T> {
         self.locked().get(&of).cloned()
     }
 
+    /// The result that belongs to a digest, computed if it is not known; errors are not kept.
+    ///
+    /// # Errors
+    /// Those of `compute`.
+    pub(super) fn or_computed<E>(
+        &self,
+        of: Digest,
+        compute: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, E> {
+        if let Some(known) = self.get(of) {
+            return Ok(known);
+        }
+        let result = compute()?;
+        self.keep(of, result.clone());
+        Ok(result)
+    }
+
     /// Keeps a result; all others are forgotten when they become too many.
     pub(super) fn keep(&self, of: Digest, result: T) {
         let mut known = self.locked();

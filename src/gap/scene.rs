@@ -8,6 +8,7 @@ use super::bins::{Bin, BinValues};
 use super::data::Data;
 use super::gls::{Column, Pulses};
 use super::lean::Wind;
+use super::memory::{Digest, Memory};
 use super::response::Response;
 use super::steady::{Moment, Steady};
 use crate::base::air::density_ratio;
@@ -16,6 +17,17 @@ use crate::effects::select::looks_at;
 use crate::effects::{Definition, EffectError, Reference, Role, Signal, Signals, Supply};
 use crate::numeric::{extent, mean};
 use crate::vehicle::Vehicle;
+
+/// Pulses of steady flights that were computed before.
+static PULSES: Memory<Column> = Memory::of(KEPT);
+/// The same at several vertical speeds.
+static SHIFTED: Memory<Vec<Vec<Vec<f64>>>> = Memory::of(KEPT);
+/// The same of drones that deviate.
+static DEVIATING: Memory<Vec<Vec<f64>>> = Memory::of(KEPT);
+/// Responses that were computed before.
+static RESPONSES: Memory<Vec<Vec<Response>>> = Memory::of(KEPT);
+/// Results that are kept of each kind: some ten megabytes of 50 drones.
+const KEPT: usize = 256;
 
 /// Moments that one thread takes at a time. Numerical: some milliseconds.
 const CHUNK: usize = 64;
@@ -218,6 +230,10 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        PULSES.or_computed(self.digest(vehicle), || self.pulses_of(vehicle))
+    }
+
+    fn pulses_of(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
         let steady = self.steady(vehicle)?;
         let battery = hover_ah_per_s(vehicle);
         let hover_ah_per_s = battery.unwrap_or_default();
@@ -267,12 +283,18 @@ impl Scene {
         vehicle: &Vehicle,
         effect: &str,
     ) -> Result<Vec<Vec<f64>>, EffectError> {
+        let mut digest = self.digest(vehicle);
+        digest.add_debug(&effect);
+        DEVIATING.or_computed(digest, || self.deviating_of(vehicle, effect))
+    }
+
+    fn deviating_of(&self, vehicle: &Vehicle, effect: &str) -> Result<Vec<Vec<f64>>, EffectError> {
         let mut of_groups = Vec::new();
         for group in 0..self.signals.len() {
             let drones = self.neighbours[group].len().max(1) as f64;
             let own = |of: &Definition| if of.name == effect { drones.sqrt().recip() } else { 0.0 };
             let deviating = Steady::deviating(vehicle, own)?;
-            let mut steady = deviating.answering(self.as_flown.as_ref());
+            let mut steady = deviating.answering(self.as_flown.as_ref()).following();
             let supply = |at: &Moment| Supply::Used(at.signals.charge_used_ah);
             let pulse = |at: Moment| steady.pulse_us(&at, supply(&at), 0.0);
             of_groups.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
@@ -302,8 +324,73 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Response>>, EffectError> {
-        let steady = self.steady(&calm(vehicle))?;
-        self.each(&steady, |steady, _, at| steady.response(at))
+        RESPONSES.or_computed(self.digest(vehicle), || {
+            let steady = self.steady(&calm(vehicle))?;
+            self.each(&steady, |steady, _, at| steady.response(at))
+        })
+    }
+
+    /// All that the pulses of a vehicle's steady flight follow from.
+    fn digest(&self, vehicle: &Vehicle) -> Digest {
+        // All fields by name: a new one must be taken in, too.
+        let Self {
+            signals,
+            relative_mps,
+            updraft_mps: _,
+            volts,
+            cells: _,
+            resting_v: _,
+            resistance_ohm: _,
+            flown_w: _,
+            neighbours,
+            as_flown,
+        } = self;
+        let mut digest = Digest::new();
+        for group in signals {
+            for at in group {
+                let Signals {
+                    climb_mps,
+                    horizontal_mps,
+                    tilt_rad,
+                    height_m,
+                    time_s,
+                    density_ratio,
+                    charge_used_ah,
+                    acceleration_mps2,
+                    deviation,
+                    neighbours,
+                    increment_us,
+                    sensitivity,
+                } = at;
+                for value in [
+                    climb_mps,
+                    horizontal_mps,
+                    tilt_rad,
+                    height_m,
+                    time_s,
+                    density_ratio,
+                    charge_used_ah,
+                    acceleration_mps2,
+                    deviation,
+                    neighbours,
+                    increment_us,
+                    sensitivity,
+                ] {
+                    digest.add(value.to_bits());
+                }
+            }
+            digest.add(group.len() as u64);
+        }
+        digest.add_all(relative_mps.iter().flatten().flatten());
+        digest.add(u64::from(volts.is_some()));
+        for drones in volts.iter().flatten() {
+            drones.iter().for_each(|bins| digest.add_all(bins));
+            digest.add(drones.len() as u64);
+        }
+        neighbours.iter().for_each(|group| digest.add_all(group));
+        digest.add_debug(as_flown);
+        digest.add_debug(vehicle);
+        digest
     }
 
     /// Something of each moment, by group and bin.
@@ -315,7 +402,7 @@ impl Scene {
         let of_group = |group: usize| {
             let moments: Vec<Moment> = self.moments(group).collect();
             let some = |(chunk, moments): (usize, &[Moment])| -> Result<Vec<T>, EffectError> {
-                let mut steady = steady.clone();
+                let mut steady = steady.following();
                 let bins = (chunk * CHUNK..).zip(moments);
                 bins.map(|(bin, at)| of(&mut steady, (group, bin), at)).collect()
             };
@@ -332,20 +419,22 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::pulses`].
-    pub(super) fn shifted<const COUNT: usize>(
+    pub(super) fn shifted(
         &self,
         vehicle: &Vehicle,
-        shifts_mps: [f64; COUNT],
-    ) -> Result<Vec<Vec<[f64; COUNT]>>, EffectError> {
-        let steady = self.steady(vehicle)?;
-        self.each(&steady, |steady, _, at| {
-            let mut pulses_us = [0.0; COUNT];
-            for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {
-                let shifted = at.climbing(at.signals.climb_mps + shift_mps);
-                *pulse_us =
-                    steady.pulse_us(&shifted, Supply::Used(at.signals.charge_used_ah), 0.0)?;
-            }
-            Ok(pulses_us)
+        shifts_mps: &[f64],
+    ) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let mut digest = self.digest(vehicle);
+        digest.add_all(shifts_mps);
+        SHIFTED.or_computed(digest, || {
+            let steady = self.steady(vehicle)?;
+            self.each(&steady, |steady, _, at| {
+                let pulse = |shift_mps: &f64| {
+                    let shifted = at.climbing(at.signals.climb_mps + shift_mps);
+                    steady.pulse_us(&shifted, Supply::Used(at.signals.charge_used_ah), 0.0)
+                };
+                shifts_mps.iter().map(pulse).collect()
+            })
         })
     }
 }

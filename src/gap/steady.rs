@@ -78,6 +78,11 @@ impl Steady {
         Self { as_flown: as_flown.cloned(), ..self }
     }
 
+    /// The same, for moments that follow each other.
+    pub(super) fn following(&self) -> Self {
+        Self { trim: self.trim.clone().following(), ..self.clone() }
+    }
+
     fn condition(&self, at: &Moment, supply: Supply, neighbours: f64) -> Condition {
         let mut condition = at.condition(supply, neighbours);
         let more_mps2 = self.as_flown.as_ref().map_or(0.0, |own| own.at(at.signals.climb_mps));

@@ -6,6 +6,11 @@ const STEP: f64 = 1e-4;
 const ENOUGH: f64 = 2e-3;
 /// Steps at most. Numerical; searches end earlier by [`ENOUGH`].
 const MOST_STEPS: usize = 40;
+/// The search ends, too, where a step promises less than this share of what is enough, by the curvature that was learned
+/// on the way and by that which the search began with. Numerical.
+const CERTAIN: f64 = 0.02;
+/// Shares of a step that was too long, within which a parabola places the next one. Numerical.
+const SHORTER: [f64; 2] = [0.1, 0.5];
 /// Longest step of any variable: a factor of e. Numerical.
 const LONGEST: f64 = 1.0;
 
@@ -113,6 +118,12 @@ fn descend<const N: usize, T>(
             inverse = identity();
             direction = gradient.map(|slope| -slope);
         }
+        let promised = -0.5 * dot(&direction, &gradient);
+        let is_bottom = promised < CERTAIN * end.enough
+            && 0.5 * bilinear(&first(), &gradient) < CERTAIN * end.enough;
+        if is_bottom {
+            break;
+        }
         let longest = direction.iter().fold(0.0_f64, |most, part| most.max(part.abs()));
         if longest > LONGEST {
             direction = direction.map(|part| part * LONGEST / longest);
@@ -130,7 +141,7 @@ fn descend<const N: usize, T>(
                 found = Some((next, next_value, next_known));
                 break;
             }
-            length *= 0.4;
+            length *= shorter(value - next_value, length * slope);
         }
         let Some((next, next_value, next_known)) = found else { break };
         let next_gradient = gradient_at(&next, &next_known);
@@ -176,6 +187,18 @@ fn identity<const N: usize>() -> [[f64; N]; N] {
 
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn bilinear<const N: usize>(matrix: &[[f64; N]; N], by: &[f64; N]) -> f64 {
+    matrix.iter().zip(by).map(|(row, part)| part * dot(row, by)).sum()
+}
+
+/// Share of a step that gained so little, at whose bottom a parabola lies that begins with the slope over the whole step.
+fn shorter(gained: f64, slope: f64) -> f64 {
+    let [least, most] = SHORTER;
+    let rise = -(gained + slope);
+    let share = -0.5 * slope / rise;
+    if share.is_finite() { share.clamp(least, most) } else { least }
 }
 
 fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {

@@ -37,7 +37,12 @@ pub fn induced(axial: f64, edgewise: f64) -> f64 {
             let through = axial + value;
             let past = (edgewise * edgewise + through * through).sqrt();
             let slope = past + value * through / past;
-            value -= (value * past - 1.0) / slope.max(0.1);
+            let next = value - (value * past - 1.0) / slope.max(0.1);
+            // Every further step would find the same.
+            if next == value {
+                break;
+            }
+            value = next;
         }
     }
     value
@@ -53,7 +58,12 @@ pub fn at_speed(share: f64, axial: f64, edgewise: f64) -> Working {
             let through = axial + value;
             let past = (edgewise * edgewise + through * through).sqrt().max(1e-6);
             let slope = past + value * through / past + beta;
-            value -= (value * past + beta * through - 1.0 - beta) / slope.max(0.1);
+            let next = value - (value * past + beta * through - 1.0 - beta) / slope.max(0.1);
+            // Every further step would find the same.
+            if next == value {
+                break;
+            }
+            value = next;
         }
     }
     let flow = axial + value;
@@ -77,7 +87,7 @@ pub fn in_climb(share: f64, induced: f64, axial: f64) -> Working {
         let off = thrust - 1.0 - beta + beta * flow(thrust);
         let of_root = (1.0 - induced) / thrust.sqrt() + induced / (half * half + thrust).sqrt();
         let next = (thrust - off / (1.0 + 0.5 * beta * of_root)).max(LEAST_THRUST);
-        // Every further step would find the same.
+        // As above.
         if next == thrust {
             break;
         }

@@ -134,7 +134,26 @@ pub struct Trim {
     hover_output: f64,
     /// Inverse of the derivatives at a hover, from which every search begins.
     inverse_at_hover: Option<Matrix3<f64>>,
+    /// Where the next search begins, in a series of states that are like each other.
+    last: Option<Beginning>,
+    follows: bool,
     gust_sd_mps: f64,
+}
+
+/// Where a quasi-Newton search begins: a state, and the inverse of the derivatives there.
+#[derive(Clone, Copy, Debug)]
+struct Beginning {
+    at: Unknown,
+    inverse: Matrix3<f64>,
+}
+
+/// The end of a search for a balance.
+#[derive(Clone, Copy, Debug)]
+struct Ended {
+    at: Unknown,
+    balances: bool,
+    /// Inverse of the derivatives, as a quasi-Newton search left it.
+    inverse: Option<Matrix3<f64>>,
 }
 
 /// What the forces are found for: share of full thrust, and the lean.
@@ -164,7 +183,14 @@ impl Trim {
         let plant = Plant::with_effects(&airframe, effects, home_m, STEP_S);
         let gust_sd_mps = plant.effects.gust_sd_mps();
         // From a third of full thrust, as most multirotors hover, to where this one does.
-        let mut trim = Self { plant, hover_output: 0.35, inverse_at_hover: None, gust_sd_mps };
+        let mut trim = Self {
+            plant,
+            hover_output: 0.35,
+            inverse_at_hover: None,
+            last: None,
+            follows: false,
+            gust_sd_mps,
+        };
         let hover = Condition::default();
         trim.settle(&hover);
         let at = trim.balanced(&hover);
@@ -172,6 +198,14 @@ impl Trim {
         let left = trim.left_over(&hover, &at);
         trim.inverse_at_hover = trim.inverse_at(&hover, &at, &left);
         Ok(trim)
+    }
+
+    /// The same, for conditions that follow each other closely: each search begins with the state that was found last, and
+    /// from a hover where that leads nowhere. What is found is as exact, and the same but for its last
+    /// digits; where the vehicle can hardly fly, a state may be found that is too far from a hover.
+    #[must_use]
+    pub fn following(self) -> Self {
+        Self { follows: true, last: None, ..self }
     }
 
     /// The steady state under a condition; `None` where the forces do not balance at up to four times the rotors'
@@ -200,8 +234,10 @@ impl Trim {
         if left_mps2.is_nan() || left_mps2 > BESIDE_A_JUMP_MPS2 {
             return None;
         }
-        // The torque is that between the gusts.
-        self.left_over_in(condition, &found, 0.0);
+        if self.gust_sd_mps != 0.0 {
+            // The torque is that between the gusts.
+            self.left_over_in(condition, &found, 0.0);
+        }
         let density_ratio = self.met(condition).0.density_ratio;
         let (output, torque) = (found.x, self.plant.torque);
         let command = match self.plant.sitl {
@@ -228,12 +264,18 @@ impl Trim {
     /// that, Newton's from wind to wind.
     fn balanced(&mut self, condition: &Condition) -> Unknown {
         let hover = Vector3::new(self.hover_output, 0.0, 0.0);
-        if let Some(inverse) = self.inverse_at_hover
-            && let (found, true) = self.nearest(condition, hover, Some(inverse))
-        {
-            return found;
+        let from_hover = self.inverse_at_hover.map(|inverse| Beginning { at: hover, inverse });
+        for Beginning { at, inverse } in self.last.into_iter().chain(from_hover) {
+            let ended = self.nearest(condition, at, Some(inverse));
+            if ended.balances {
+                self.last = ended
+                    .inverse
+                    .filter(|_| self.follows)
+                    .map(|inverse| Beginning { at: ended.at, inverse });
+                return ended.at;
+            }
         }
-        let (found, balances) = self.nearest(condition, hover, None);
+        let Ended { at: found, balances, .. } = self.nearest(condition, hover, None);
         if balances {
             return found;
         }
@@ -244,12 +286,12 @@ impl Trim {
                 |speed: Vector3<f64>| speed.component_mul(&Vector3::new(share, share, 1.0));
             let velocity_mps = in_less(condition.velocity_mps);
             let air_mps = in_less(condition.air_mps);
-            let (there, balances) =
-                self.nearest(&Condition { velocity_mps, air_mps, ..*condition }, from, None);
-            if !balances {
+            let less = Condition { velocity_mps, air_mps, ..*condition };
+            let there = self.nearest(&less, from, None);
+            if !there.balances {
                 return found;
             }
-            from = there;
+            from = there.at;
         }
         from
     }
@@ -261,7 +303,7 @@ impl Trim {
         condition: &Condition,
         from: Unknown,
         mut inverse: Option<Matrix3<f64>>,
-    ) -> (Unknown, bool) {
+    ) -> Ended {
         let mut at = from;
         let mut left = self.left_over(condition, &at);
         let (mut best, mut least) = (at, left.norm());
@@ -295,7 +337,7 @@ impl Trim {
                 inverse = updated(&known, &(at - was), &(left - before));
             }
         }
-        (best, least < BALANCED_MPS2)
+        Ended { at: best, balances: least < BALANCED_MPS2, inverse }
     }
 
     /// Inverse of the derivatives of what is left by the unknowns.
@@ -440,11 +482,11 @@ mod tests {
                 let condition = Condition { velocity_mps, ..Condition::default() };
                 trim.settle(&condition);
                 let hover = Vector3::new(trim.hover_output, 0.0, 0.0);
-                let (newton, balances) = trim.nearest(&condition, hover, None);
+                let Ended { at: newton, balances, .. } = trim.nearest(&condition, hover, None);
                 let found = trim.balanced(&condition);
                 all += 1;
                 let inverse = trim.inverse_at_hover;
-                quick += usize::from(trim.nearest(&condition, hover, inverse).1);
+                quick += usize::from(trim.nearest(&condition, hover, inverse).balances);
                 if balances {
                     assert!(
                         (found - newton).amax() < 1e-8,
@@ -454,6 +496,45 @@ mod tests {
             }
         }
         assert!(20 * quick > 19 * all, "{quick} of {all}");
+    }
+
+    #[test]
+    fn a_search_that_follows_another_finds_what_one_from_a_hover_finds() {
+        let effects = ["rotor-inflow", "vortex-ring", "blade-flapping", "translational-lift"];
+        for name in ["airsim-generic-quad", "pixel", "phantom4", "arducopter-sitl"] {
+            let mut vehicle = builtin(name).unwrap();
+            for effect in effects {
+                vehicle.effects.entry(effect.to_owned()).or_default().on = true;
+            }
+            let with = Trim::of(&vehicle);
+            let mut alone = with.or_else(|_| Trim::of(&builtin(name).unwrap())).unwrap();
+            let mut following = alone.clone().following();
+            let mut more = 0;
+            for step in 0..2000_u32 {
+                let part = |by: u32, most: f64| most * (f64::from(step * by % 401) / 200.0 - 1.0);
+                // Both jumps and small steps, into descents in which the wake comes back.
+                let slow = f64::from(step).sin();
+                let wide = if step % 7 == 0 { 6.0 } else { 0.5 };
+                let velocity_mps = Vector3::new(
+                    part(37, wide) + 4.0 * slow,
+                    part(91, wide),
+                    part(11, wide) + 5.0 * (0.01 * f64::from(step)).sin(),
+                );
+                let condition = Condition { velocity_mps, ..Condition::default() };
+                let (one, other) = (alone.at(&condition), following.at(&condition));
+                let Some(one) = one else {
+                    more += usize::from(other.is_some());
+                    continue;
+                };
+                let other = other.unwrap_or_else(|| panic!("{name} {velocity_mps}"));
+                assert!(
+                    (one.pulse_us - other.pulse_us).abs() < 1e-6,
+                    "{name} {velocity_mps}: {one:?} {other:?}"
+                );
+            }
+            // Where a vehicle can hardly fly, a search from near finds what one from a hover does not.
+            assert!(more < 40, "{name}: {more}");
+        }
     }
 
     #[test]
