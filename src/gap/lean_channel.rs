@@ -292,6 +292,31 @@ mod tests {
     }
 
     #[test]
+    fn a_drag_that_is_not_named_may_stand_behind_another_finding() {
+        let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let vehicle = trial::vehicle();
+        let model = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+        assert!(!may_lack_drag(&comparison, &vehicle), "no leg was flown");
+        let mut told = |more: f64, linear_se: f64| {
+            let law = LeanLaw { linear: model.linear + more, ..model };
+            comparison.wind.measured = Some(Measured { law, linear_se, misfit_nats: 0.0 });
+            may_lack_drag(&comparison, &vehicle)
+        };
+        assert!(told(0.021, 0.005));
+        assert!(!told(0.021, 0.008), "chance does as much");
+        assert!(!told(0.0025, 1e-4), "no file knows its vehicle so well");
+        assert!(!told(-0.021, 0.005), "who leans less lacks no drag");
+        let mut with_drag = vehicle.clone();
+        Role::RotorDrag.set(&mut with_drag, model.linear + 0.021);
+        comparison.wind.measured = Some(Measured {
+            law: LeanLaw { linear: model.linear + 0.021, ..model },
+            linear_se: 0.005,
+            misfit_nats: 0.0,
+        });
+        assert!(!may_lack_drag(&comparison, &with_drag), "the model has it already");
+    }
+
+    #[test]
     fn a_drag_that_leans_tell_comes_on_top_of_the_frame_s_own() {
         let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
         let mut told = |vehicle: Vehicle, more: f64| {
