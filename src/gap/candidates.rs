@@ -12,6 +12,7 @@ use super::noise::{GroupPattern, Hyper};
 use super::pack;
 use super::response::{self, Response};
 use super::scene::Scene;
+use super::verdict::Interval;
 use crate::effects::{Definition, EffectError, LIBRARY, Role, Sought, find, select};
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
@@ -495,8 +496,11 @@ const DRAG_STEP: f64 = 0.0025;
 /// Most of these steps, up to 0.06 s/m: three times the drag of small rotors. Chosen.
 const MOST_DRAG_STEPS: u32 = 24;
 
-/// The drag of the rotors that fits best by the wind that it lets the lean say, with its standard
-/// error, s/m. `there` is the comparison in the updraft that goes with it.
+/// What a size may gain less than the best and still be in its interval, nats: two standard errors.
+const INTERVAL_NATS: f64 = 2.0;
+
+/// The drag of the rotors that fits best by the wind that it lets the lean say, with its 95 %
+/// interval, s/m. `there` is the comparison in the updraft that goes with it.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -505,7 +509,7 @@ pub(super) fn drag_by_lean(
     there: &Comparison,
     vehicle: &Vehicle,
     base: &Solution,
-) -> Result<Option<(f64, f64)>, EffectError> {
+) -> Result<Option<Interval>, EffectError> {
     let without = comparison.pulses_by_lean(vehicle)?;
     let mut gains = Vec::new();
     for step in 1..=MOST_DRAG_STEPS {
@@ -521,20 +525,51 @@ pub(super) fn drag_by_lean(
             gains.push((size, as_it_is));
         }
     }
-    let Some(best) = (0..gains.len()).max_by(|a, b| gains[*a].1.total_cmp(&gains[*b].1)) else {
-        return Ok(None);
-    };
+    let high = Role::RotorDrag.place().map_or(0.0, |place| place.parameter.high);
+    Ok(most_likely(&gains, high))
+}
+
+/// The most likely of some sizes, with the interval in which they gain nearly as much, nats; without any, nothing is gained, and
+/// sizes beyond those that were tried, up to `high`, do as the last one.
+fn most_likely(gains: &[(f64, f64)], high: f64) -> Option<Interval> {
+    let best = (0..gains.len()).max_by(|a, b| gains[*a].1.total_cmp(&gains[*b].1))?;
     let (size, most) = gains[best];
-    let [Some((_, below)), Some((_, above))] =
-        [best.checked_sub(1).and_then(|place| gains.get(place)), gains.get(best + 1)]
-    else {
-        return Ok(Some((size, DRAG_STEP)));
+    let needed = most - INTERVAL_NATS;
+    // Between two sizes, of which the first is likely enough and the other is not, by a straight line.
+    let between = |(inside, gain): (f64, f64), (outside, less): (f64, f64)| {
+        inside + (outside - inside) * (gain - needed) / (gain - less)
+    };
+    let (before, after) = gains.split_at(best);
+    let nothing = [(0.0, 0.0)];
+    let mut inside = gains[best];
+    let mut low = 0.0;
+    for next in before.iter().rev().chain(&nothing) {
+        if next.1 < needed {
+            low = between(inside, *next);
+            break;
+        }
+        inside = *next;
+    }
+    let mut inside = gains[best];
+    let mut end = high.max(size);
+    for next in &after[1..] {
+        if next.1 < needed {
+            end = between(inside, *next);
+            break;
+        }
+        inside = *next;
+    }
+    let (Some((_, below)), Some((_, above))) = (before.last(), after.get(1)) else {
+        return Some(Interval { value: size, low, high: end });
     };
     // The parabola through the top.
     let curvature = 2.0 * most - below - above;
     let apart = if curvature > 0.0 { 0.5 * (above - below) / curvature } else { 0.0 };
-    let se = if curvature > 0.0 { DRAG_STEP / curvature.sqrt() } else { DRAG_STEP };
-    Ok(Some((size + apart * DRAG_STEP, se)))
+    let value = size + apart * DRAG_STEP;
+    let half = DRAG_STEP * (2.0 * INTERVAL_NATS / curvature).sqrt();
+    let is_sharp = curvature > 0.0 && half < DRAG_STEP;
+    let (low, high) = if is_sharp { (value - half, value + half) } else { (low, end) };
+    Some(Interval { value, low, high })
 }
 
 /// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.
@@ -578,6 +613,27 @@ mod tests {
     use super::super::search::admissible;
     use super::super::trial;
     use super::*;
+
+    #[test]
+    fn a_drag_that_gains_up_to_the_end_of_what_was_tried_is_not_known_there() {
+        let gains = |of: fn(f64) -> f64| -> Vec<(f64, f64)> {
+            let sizes = (1..=MOST_DRAG_STEPS).map(|step| DRAG_STEP * f64::from(step));
+            sizes.map(|size| (size, of(size))).collect()
+        };
+        let told = |of: fn(f64) -> f64| most_likely(&gains(of), 0.1).unwrap();
+        let near = |of: Interval, wanted: [f64; 3]| {
+            let off = [of.value - wanted[0], of.low - wanted[1], of.high - wanted[2]];
+            assert!(off.iter().all(|off| off.abs() < 3e-4), "{of:?}, not {wanted:?}");
+        };
+        // Two standard errors of 0.001 are below a step, and of 0.004 above one.
+        near(told(|size| 30.0 - 0.5 * ((size - 0.0204) / 0.001).powi(2)), [0.0204, 0.0184, 0.0224]);
+        near(told(|size| 30.0 - 0.5 * ((size - 0.03) / 0.004).powi(2)), [0.03, 0.022, 0.038]);
+        // A drone that hides most of a misread wind: the less is left of it, the less another size changes.
+        near(told(|size| 36.0 - 0.02 / size), [0.06, 0.00857, 0.1]);
+        // Hardly anything gained.
+        near(told(|size| 1.0 - 0.5 * ((size - 0.01) / 0.004).powi(2)), [0.01, 0.0, 0.018]);
+        assert!(most_likely(&[], 0.1).is_none());
+    }
 
     #[test]
     fn air_that_begins_to_rise_takes_away_the_pulse_that_a_drone_answers_with() {

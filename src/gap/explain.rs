@@ -459,11 +459,11 @@ impl Search<'_> {
         if candidate.variants[best.variant].vehicle.is_some() {
             let mut next = joined(found.vehicle.clone(), candidate, best);
             if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
-                && let Some((drag, se)) =
+                && let Some(drag) =
                     drag_by_lean(&before_it, comparison, &found.vehicle, &round.base)?
             {
-                Role::RotorDrag.set(&mut next, drag);
-                by_lean = Some(lean_parameter(size, drag, se));
+                Role::RotorDrag.set(&mut next, drag.value);
+                by_lean = Some(lean_parameter(size, drag));
             }
             let known = found.parameters.iter().any(|p| p.effect == candidate.name);
             if !known {

@@ -6,7 +6,7 @@ use super::super::dependence::Dependence;
 use super::super::generic::drawn;
 use super::super::search::{Round, Sought, Thresholds};
 use super::super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
-use crate::effects::Signals;
+use crate::effects::{Role, Signals};
 
 /// The end of the search, if this round is the last.
 pub(super) fn rest(round: &Round, sought: Sought<'_>, thresholds: &Thresholds) -> Rest {
@@ -62,14 +62,16 @@ pub(super) fn finding(names: Vec<String>, was_there: bool, known: Option<Fitted>
 }
 
 /// The drag of the rotors as a fitted parameter.
-pub(super) fn lean_parameter(size: Size, drag: f64, se: f64) -> Fitted {
+pub(super) fn lean_parameter(size: Size, drag: Interval) -> Fitted {
+    let Interval { value, low, high } = drag;
+    let most = Role::RotorDrag.place().map_or(f64::INFINITY, |place| place.parameter.high);
     Fitted {
         name: size.name.to_owned(),
         unit: size.unit.to_owned(),
         value: Interval {
-            value: drag,
-            low: (drag - LEAN_DOUBT.hypot(2.0 * se)).max(0.0),
-            high: drag + LEAN_DOUBT.hypot(2.0 * se),
+            value,
+            low: (value - LEAN_DOUBT.hypot(value - low)).max(0.0),
+            high: (value + LEAN_DOUBT.hypot(high - value)).min(most),
         },
         before: None,
     }
