@@ -200,7 +200,7 @@ impl Trim {
         Ok(trim)
     }
 
-    /// The same, for conditions that follow each other closely: each search begins with the state that was found last, and
+    /// Steady states for conditions that follow each other closely: each search begins with the state found last, and
     /// from a hover where that leads nowhere. What is found is as exact, and the same but for its last
     /// digits; where the vehicle can hardly fly, a state may be found that is too far from a hover.
     #[must_use]
