@@ -384,10 +384,14 @@ impl Scene {
         digest.add_all(relative_mps.iter().flatten().flatten());
         digest.add(u64::from(volts.is_some()));
         for drones in volts.iter().flatten() {
-            drones.iter().for_each(|bins| digest.add_all(bins));
+            for bins in drones {
+                digest.add_all(bins);
+            }
             digest.add(drones.len() as u64);
         }
-        neighbours.iter().for_each(|group| digest.add_all(group));
+        for group in neighbours {
+            digest.add_all(group);
+        }
         digest.add_debug(as_flown);
         digest.add_debug(vehicle);
         digest
