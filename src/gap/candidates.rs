@@ -541,24 +541,19 @@ fn most_likely(gains: &[(f64, f64)], high: f64) -> Option<Interval> {
     };
     let (before, after) = gains.split_at(best);
     let nothing = [(0.0, 0.0)];
-    let mut inside = gains[best];
-    let mut low = 0.0;
-    for next in before.iter().rev().chain(&nothing) {
-        if next.1 < needed {
-            low = between(inside, *next);
-            break;
+    // Where sizes that go away from the best are no longer likely enough; beyond them all, it is the last that there can be.
+    let edge = |sizes: &mut dyn Iterator<Item = &(f64, f64)>, last: f64| {
+        let mut inside = gains[best];
+        for next in sizes {
+            if next.1 < needed {
+                return between(inside, *next);
+            }
+            inside = *next;
         }
-        inside = *next;
-    }
-    let mut inside = gains[best];
-    let mut end = high.max(size);
-    for next in &after[1..] {
-        if next.1 < needed {
-            end = between(inside, *next);
-            break;
-        }
-        inside = *next;
-    }
+        last
+    };
+    let low = edge(&mut before.iter().rev().chain(&nothing), 0.0);
+    let end = edge(&mut after.iter().skip(1), high.max(size));
     let (Some((_, below)), Some((_, above))) = (before.last(), after.get(1)) else {
         return Some(Interval { value: size, low, high: end });
     };

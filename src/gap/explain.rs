@@ -539,24 +539,24 @@ impl Search<'_> {
         }
         if let Some(gone) = self.found.weakest(&self.comparison, self.vehicle)? {
             // Explained by what came after it, or a size of nothing.
-            self.found.drop_effect(gone, self.vehicle);
-            self.refused.push(gone);
-            self.comparison = self.against_model()?;
-            self.found.refit(&self.comparison)?;
+            self.takes_back(gone)?;
         }
         self.found.comparison = self.comparison.clone();
         Ok(())
     }
 
+    /// Takes an effect back for good, and flies and fits the model without it.
+    fn takes_back(&mut self, effect: &'static str) -> Result<(), GapError> {
+        self.found.drop_effect(effect, self.vehicle);
+        self.refused.push(effect);
+        self.comparison = self.against_model()?;
+        self.found.refit(&self.comparison)
+    }
+
     /// Takes back what was found last if the model had it in that size.
     fn takes_back_the_same(&mut self) -> Result<(), GapError> {
         let Some(same) = self.found.same_as_before() else { return Ok(()) };
-        self.found.drop_effect(same, self.vehicle);
-        self.refused.push(same);
-        self.comparison = self.against_model()?;
-        if !self.found.parameters.is_empty() {
-            self.found.refit(&self.comparison)?;
-        }
+        self.takes_back(same)?;
         self.found.comparison = self.comparison.clone();
         Ok(())
     }

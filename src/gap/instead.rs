@@ -58,7 +58,7 @@ struct Decided {
 }
 
 /// What explains a flight best: what was found, one effect in its place, or nothing. Effects that explain it as well as a
-/// single finding are told as a class with it. `by_leans` says whether leans alone told a drag of the rotors.
+/// single finding are told as a class with it. `by_leans` says whether leans tell a drag of the rotors, or nearly do.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.

@@ -26,8 +26,10 @@ static SHIFTED: Memory<Vec<Vec<Vec<f64>>>> = Memory::of(KEPT);
 static DEVIATING: Memory<Vec<Vec<f64>>> = Memory::of(KEPT);
 /// Responses that were computed before.
 static RESPONSES: Memory<Vec<Vec<Response>>> = Memory::of(KEPT);
-/// Results that are kept of each kind: some ten megabytes of 50 drones.
+/// Results that are kept of each kind: 15 MB of pulses of 50 drones in 150 bins.
 const KEPT: usize = 256;
+/// Pulses of more drones and bins are not kept: those of a thousand drones in 150 would be 300 MB.
+const MOST_VALUES: usize = 50_000;
 
 /// Moments that one thread takes at a time. Numerical: some milliseconds.
 const CHUNK: usize = 64;
@@ -230,6 +232,10 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        let values = self.signals.iter().zip(&self.neighbours);
+        if values.map(|(bins, drones)| bins.len() * drones.len()).sum::<usize>() > MOST_VALUES {
+            return self.pulses_of(vehicle);
+        }
         PULSES.or_computed(self.digest(vehicle), || self.pulses_of(vehicle))
     }
 
@@ -348,36 +354,23 @@ impl Scene {
         let mut digest = Digest::new();
         for group in signals {
             for at in group {
+                // What is left out is not looked at by a steady state (`Moment::condition`).
                 let Signals {
                     climb_mps,
-                    horizontal_mps,
-                    tilt_rad,
+                    horizontal_mps: _,
+                    tilt_rad: _,
                     height_m,
                     time_s,
                     density_ratio,
                     charge_used_ah,
                     acceleration_mps2,
-                    deviation,
-                    neighbours,
-                    increment_us,
-                    sensitivity,
+                    deviation: _,
+                    neighbours: _,
+                    increment_us: _,
+                    sensitivity: _,
                 } = at;
-                for value in [
-                    climb_mps,
-                    horizontal_mps,
-                    tilt_rad,
-                    height_m,
-                    time_s,
-                    density_ratio,
-                    charge_used_ah,
-                    acceleration_mps2,
-                    deviation,
-                    neighbours,
-                    increment_us,
-                    sensitivity,
-                ] {
-                    digest.add(value.to_bits());
-                }
+                let of_air = [climb_mps, height_m, density_ratio, acceleration_mps2];
+                digest.add_all(of_air.into_iter().chain([time_s, charge_used_ah]));
             }
             digest.add(group.len() as u64);
         }
@@ -406,7 +399,7 @@ impl Scene {
         let of_group = |group: usize| {
             let moments: Vec<Moment> = self.moments(group).collect();
             let some = |(chunk, moments): (usize, &[Moment])| -> Result<Vec<T>, EffectError> {
-                let mut steady = steady.following();
+                let mut steady = steady.clone().following();
                 let bins = (chunk * CHUNK..).zip(moments);
                 bins.map(|(bin, at)| of(&mut steady, (group, bin), at)).collect()
             };

@@ -79,8 +79,8 @@ impl Steady {
     }
 
     /// The same, for moments that follow each other.
-    pub(super) fn following(&self) -> Self {
-        Self { trim: self.trim.clone().following(), ..self.clone() }
+    pub(super) fn following(self) -> Self {
+        Self { trim: self.trim.following(), ..self }
     }
 
     fn condition(&self, at: &Moment, supply: Supply, neighbours: f64) -> Condition {

@@ -87,7 +87,7 @@ pub fn in_climb(share: f64, induced: f64, axial: f64) -> Working {
         let off = thrust - 1.0 - beta + beta * flow(thrust);
         let of_root = (1.0 - induced) / thrust.sqrt() + induced / (half * half + thrust).sqrt();
         let next = (thrust - off / (1.0 + 0.5 * beta * of_root)).max(LEAST_THRUST);
-        // As above.
+        // Every further step would find the same.
         if next == thrust {
             break;
         }

@@ -132,11 +132,11 @@ pub struct Trimmed {
 pub struct Trim {
     plant: Plant,
     hover_output: f64,
-    /// Inverse of the derivatives at a hover, from which every search begins.
+    /// Inverse of the derivatives at a hover, from which a search begins that follows none.
     inverse_at_hover: Option<Matrix3<f64>>,
-    /// Where the next search begins, in a series of states that are like each other.
-    last: Option<Beginning>,
+    /// Whether a search begins where the last one ended, and where that is.
     follows: bool,
+    last: Option<Beginning>,
     gust_sd_mps: f64,
 }
 
@@ -187,8 +187,8 @@ impl Trim {
             plant,
             hover_output: 0.35,
             inverse_at_hover: None,
-            last: None,
             follows: false,
+            last: None,
             gust_sd_mps,
         };
         let hover = Condition::default();
@@ -260,7 +260,7 @@ impl Trim {
         self.plant.effects.settle(&Settled { time_s, supply, neighbours });
     }
 
-    /// Broyden's method from a hover, where that finds no balance Newton's, and where the lean is too far from a hover for
+    /// Broyden's method from the last state and from a hover, where that finds no balance Newton's, and where the lean is too far from a hover for
     /// that, Newton's from wind to wind.
     fn balanced(&mut self, condition: &Condition) -> Unknown {
         let hover = Vector3::new(self.hover_output, 0.0, 0.0);
