@@ -71,8 +71,8 @@ impl Found {
             let slopes = slopes(comparison, &self.vehicle, &others)?;
             let problem =
                 Problem::new(&patterns, &split).doubting(&doubts).with(&self.extras).with(&slopes);
-            let groups = shifted(&patterns, &problem, &problem.at(&self.hyper));
-            let solution = problem.among(&groups).at(&self.hyper);
+            let groups = shifted(&patterns, &problem, &problem.at(&self.noise.hyper));
+            let solution = problem.among(&groups).at(&self.noise.hyper);
             let without = taken_back(&self.vehicle, effect, original);
             let trace = comparison.change(&without, &self.vehicle)?;
             let z = solution.information(&solution.white(&trace)).sqrt();

@@ -9,8 +9,7 @@ use super::compare::Comparison;
 use super::decide::{ALIKE, CLASS_NATS, PRODUCT, What, form, margin_nats};
 use super::error::GapError;
 use super::explain::{Found, MOST_GUSTS_MPS, with_felt};
-use super::gls::{Column, Problem, Split};
-use super::noise::Hyper;
+use super::gls::{Column, Problem, Split, Start};
 use super::refine::{Parameter, doubts, parameters_of, refine, slopes};
 use super::response::{Response, gusts_mps, settled};
 use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
@@ -155,7 +154,7 @@ impl Contest<'_> {
             .collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some((.., first)) = members.first().cloned() else { return Ok(Vec::new()) };
-        let at = problem.at(&first.hyper);
+        let at = problem.at(&first.noise.hyper);
         let white = |rival: &Ranked| at.white(form(self.sought, rival));
         let own = white(&first);
         members.retain(|(.., rival)| {
@@ -172,7 +171,7 @@ impl Contest<'_> {
         let of = |felt: &[Vec<Vec<Response>>]| {
             let free = Free { columns, felt, beta: &product.beta };
             let vehicle = found.vehicle.clone();
-            self.in_full(self.comparison, vehicle, &found.parameters, free, product.hyper)
+            self.in_full(self.comparison, vehicle, &found.parameters, free, &product.noise)
         };
         // What it does to the scatter is known by its size, which means alone may hardly tell.
         let (felt, numb) = rayon::join(|| of(&generic.felt), || of(&[]));
@@ -195,7 +194,7 @@ impl Contest<'_> {
             let (before, base) = (before(candidate), &self.round.base);
             parameters.extend(parameters_of(comparison, &vehicle, candidate.name, before, base)?);
         }
-        self.in_full(comparison, vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
+        self.in_full(comparison, vehicle, &parameters, Free::default(), &ranked.noise).map(Some)
     }
 
     /// Log-posterior of the flight with a model whose sizes and gusts settle first, at the speed relative to
@@ -206,25 +205,25 @@ impl Contest<'_> {
         mut vehicle: Vehicle,
         parameters: &[Parameter],
         free: Free<'_>,
-        mut hyper: Hyper,
+        noise: &Start,
     ) -> Result<f64, GapError> {
         let found = self.found;
         let comparison =
             &Comparison::clone(comparison).feeling(&with_felt(&found.felt, free.felt, free.beta));
         let extras = [&found.extras[..], free.columns].concat();
-        let mut gusts = found.gusts_mps;
+        let (mut noise, mut gusts) = (noise.clone(), found.gusts_mps);
         for _ in 0..ROUNDS {
-            let fit = refine(comparison, &vehicle, parameters, &extras, hyper, gusts, true)?;
+            let fit = refine(comparison, &vehicle, parameters, &extras, &noise, gusts, true)?;
             vehicle = fit.vehicle;
-            hyper = fit.hyper;
-            gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
+            noise = fit.noise;
+            gusts = gusts_mps(&noise.hyper).min(MOST_GUSTS_MPS);
         }
         let patterns = comparison.patterns(&vehicle, gusts)?;
         let split = Split::of(&comparison.residual(&vehicle, gusts)?);
         let doubts = doubts(comparison, &vehicle, parameters)?;
         let slopes = slopes(comparison, &vehicle, parameters)?;
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&extras).with(&slopes);
-        let (_, solution) = settled(&problem, problem.at(&hyper), |_| patterns.clone());
+        let (_, solution) = settled(&problem, problem.as_fitted(&noise), |_| patterns.clone());
         Ok(solution.log_posterior())
     }
 }
@@ -275,7 +274,7 @@ mod tests {
         let library = library(&found.vehicle, &comparison, Updraft::Same).unwrap();
         let inflow = library.iter().position(|one| one.name == "rotor-inflow").unwrap();
         let sought = Sought { library: &library, generics: &[], drones: &[3] };
-        let mut round = round(&problem, Hyper::default(), sought, false);
+        let mut round = round(&problem, Start::default(), sought, false);
         let mut likely = |plain: f64| {
             round.library = vec![Ranked { plain, ..ranked(inflow, 60.0) }];
             let round = &round;
@@ -327,7 +326,7 @@ mod tests {
         };
         let library = [air("one", line(1.0)), air("its like", line(2.0)), air("another", wave)];
         let sought = Sought { library: &library, generics: &[], drones: &[3] };
-        let round = round(&problem, Hyper::default(), sought, false);
+        let round = round(&problem, Start::default(), sought, false);
         let contest = Contest { found: &found, comparison: &comparison, sought, round: &round };
         let settled = |members: Vec<Ranked>| {
             let what = What::Effects { members, or_else: None };

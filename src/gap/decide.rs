@@ -173,7 +173,7 @@ pub(super) fn decide(
         return nothing(limits);
     };
     let column = |ranked: &Ranked| form(sought, ranked);
-    let at = problem.at(&best.hyper);
+    let at = problem.at(&best.noise.hyper);
     let own = at.white(column(best));
     let contested = best.gain - CONTEST_MARGINS * margin_nats(best.gain);
     let alike = |ranked: &&Ranked| {
@@ -219,8 +219,8 @@ fn left_with(
     let column = form(sought, best);
     let generic: &Generic = &sought.generics[free.generic];
     let with = problem.with([column]);
-    let before = with.fit(best.hyper, Likelihood::Profile);
-    let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
+    let before = with.fit(&best.noise, Likelihood::Profile);
+    let both = with.with(&generic.columns).fit(&free.noise, Likelihood::Profile);
     both.log_posterior() - before.log_posterior() - generic.penalty
 }
 
@@ -228,7 +228,7 @@ fn left_with(
 mod tests {
     use super::super::candidates::{Candidate, Felt, Size, Variant};
     use super::super::explain::Only;
-    use super::super::gls::{Pulses, Split};
+    use super::super::gls::{Pulses, Split, Start};
     use super::super::noise::{GroupPattern, Hyper};
     use super::super::trial::{patterns, pulses, ranked};
     use super::*;
@@ -310,9 +310,9 @@ mod tests {
     }
 
     fn free(generic: usize, gain: f64) -> RankedGeneric {
-        let hyper = Hyper::default();
+        let noise = Start::default();
         let beta = vec![4.0];
-        RankedGeneric { generic, gain, plain: gain, beta, size_us: 3.0, range_us: 3.0, hyper }
+        RankedGeneric { generic, gain, plain: gain, beta, size_us: 3.0, range_us: 3.0, noise }
     }
 
     impl Case {

@@ -29,7 +29,7 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
     let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
     let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras);
-    let groups = shifted(&patterns, &problem, &problem.at(&found.hyper));
+    let groups = shifted(&patterns, &problem, &problem.at(&found.noise.hyper));
     let sizes = slopes(comparison, &found.vehicle, &found.parameters)?;
     // Sizes that were fitted are free, but for an effect's own.
     let free_but = |effect: Option<&str>| {
@@ -38,7 +38,7 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
             .filter(|(parameter, _)| Some(parameter.effect) != effect)
             .map(|(_, slope)| slope.clone())
             .collect();
-        problem.among(&groups).with(&free).at(&found.hyper)
+        problem.among(&groups).with(&free).at(&found.noise.hyper)
     };
     let solution = free_but(None);
     let candidates = library(&found.vehicle, comparison, Updraft::Same)?;

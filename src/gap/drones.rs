@@ -39,7 +39,7 @@ pub(super) fn drones(
     let mut plain_us = Vec::new();
     let mut reliability: f64 = 1.0;
     for (index, (group, pattern)) in all.data.groups.iter().zip(&patterns).enumerate() {
-        let blup = Blup::new(pattern, &found.hyper);
+        let blup = Blup::new(pattern, &found.noise.hyper);
         reliability = reliability.min(blup.slope_reliability(pattern));
         for (slot, deviation) in group.slots.iter().zip(residual.deviations(index)) {
             let (offset_us, slope) = blup.of(deviation);
@@ -49,10 +49,11 @@ pub(super) fn drones(
     }
     each.sort_by_key(|drone| drone.slot);
     let responses: Vec<f64> =
-        patterns.iter().flat_map(|pattern| pattern.responses(&found.hyper)).collect();
+        patterns.iter().flat_map(|pattern| pattern.responses(&found.noise.hyper)).collect();
     // Who responds more than the others needs another pulse where the air rises, too.
-    let by_updraft_us =
-        found.hyper.get(SLOPES) * found.updraft_mps.abs() * mean(&responses).unwrap_or_default();
+    let by_updraft_us = found.noise.hyper.get(SLOPES)
+        * found.updraft_mps.abs()
+        * mean(&responses).unwrap_or_default();
     let by_model_us = all.offsets_us(&found.vehicle)?;
     let usual_us = by_model_us.hypot(by_updraft_us);
     let plain = Moments::of(&plain_us).map_or(0.0, |moments| moments.squares);
@@ -243,7 +244,7 @@ fn correlation(each: &[DroneOffset]) -> f64 {
 
 fn words(each: &[DroneOffset], correlation: Option<f64>, found: &Found) -> Vec<String> {
     let mut words = Vec::new();
-    let spread_us = found.hyper.get(OFFSETS);
+    let spread_us = found.noise.hyper.get(OFFSETS);
     let sensitivity = Reference::of(&found.vehicle).sensitivity_us();
     if each.len() >= FEWEST {
         words.push(format!(

@@ -186,9 +186,8 @@ impl White {
     /// Of several at once.
     fn of<'s>(whitener: &Whitener, splits: impl IntoIterator<Item = &'s Split>) -> Vec<Self> {
         let splits: Vec<&Split> = splits.into_iter().collect();
-        let means =
-            whitener.means(splits.len(), |split, group, bin| splits[split].means[group][bin]);
-        let means = means.chunks_exact(whitener.bins().max(1)).map(<[f64]>::to_vec);
+        let of_means =
+            || whitener.means(splits.len(), |split, group, bin| splits[split].means[group][bin]);
         let own = |split: &&Split| {
             let mut deviations = Vec::new();
             for (group, drones) in split.deviations.iter().enumerate() {
@@ -196,8 +195,11 @@ impl White {
             }
             deviations
         };
-        let white = |(means, split)| Self { means, deviations: own(split), known: Vec::new() };
-        means.zip(&splits).map(white).collect()
+        let (means, own) =
+            rayon::join(of_means, || splits.iter().map(own).collect::<Vec<Vec<f64>>>());
+        let means = means.chunks_exact(whitener.bins().max(1)).map(<[f64]>::to_vec);
+        let white = |(means, deviations)| Self { means, deviations, known: Vec::new() };
+        means.zip(own).map(white).collect()
     }
 
     fn dot(&self, other: &Self) -> f64 {
@@ -212,7 +214,7 @@ impl White {
 static FITTED: Memory<Start> = Memory::of(20_000);
 
 /// The place at which a fit of the noise begins.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Start {
     /// Parameters of the noise.
     pub hyper: Hyper,
@@ -326,14 +328,19 @@ impl<'a> Problem<'a> {
         Solution::new(whitener, y, columns, *hyper)
     }
 
+    /// At the noise of a start, bent as there.
+    pub(super) fn as_fitted(&self, start: &Start) -> Solution {
+        Solution { inverse: start.inverse.clone(), ..self.at(&start.hyper) }
+    }
+
     /// Most probable noise from a start, with everything linear at its best.
     pub(super) fn fit(&self, start: impl Into<Start>, likelihood: Likelihood) -> Solution {
         let start = start.into();
         let mut digest = self.digest();
         start.add_to(&mut digest);
         digest.add(u64::from(likelihood == Likelihood::Restricted));
-        if let Some(Start { hyper, inverse }) = FITTED.get(digest) {
-            return Solution { inverse, ..self.at(&hyper) };
+        if let Some(known) = FITTED.get(digest) {
+            return self.as_fitted(&known);
         }
         let fitted = self.fitted(&start, likelihood);
         FITTED.keep(digest, Start::from(&fitted));

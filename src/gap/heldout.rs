@@ -106,7 +106,7 @@ impl Case<'_> {
     fn shrink(&self, residuals: &Residuals<'_>, fitted: &Fitted) -> Shrink {
         let counts: Vec<usize> = residuals.after.iter().map(Vec::len).collect();
         let Fitted { patterns, doubts, .. } = fitted;
-        let floor_us = floor(patterns, doubts, &counts, &self.found.hyper, self.seed);
+        let floor_us = floor(patterns, doubts, &counts, &self.found.noise.hyper, self.seed);
         shrink(residuals, floor_us, self.seed)
     }
 
@@ -159,11 +159,11 @@ impl Case<'_> {
         held: i64,
         speed: &(impl Fn(usize, usize) -> i64 + Sync),
     ) -> Result<Pulses, GapError> {
-        let Found { comparison, vehicle, parameters, extras, hyper, gusts_mps, .. } = self.found;
+        let Found { comparison, vehicle, parameters, extras, noise, gusts_mps, .. } = self.found;
         let keep = |group, bin| speed(group, bin) != held;
         let extras: Vec<Column> = extras.iter().map(|extra| extra.only(keep)).collect();
         let others = comparison.only(keep);
-        let fit = refine(&others, vehicle, parameters, &extras, *hyper, *gusts_mps, false)?;
+        let fit = refine(&others, vehicle, parameters, &extras, noise, *gusts_mps, false)?;
         Ok(comparison.residual(&fit.vehicle, *gusts_mps)?)
     }
 }
@@ -198,7 +198,7 @@ impl Fitted {
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let residual = comparison.residual(&found.vehicle, found.gusts_mps)?;
         let split = Split::of(&residual);
-        let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
+        let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.noise.hyper);
         let means: Vec<Vec<Vec<f64>>> = found.extras.iter().map(Column::means).collect();
         let value = |group: usize, bin: usize| {
             let parts = means.iter().zip(solution.beta.iter().skip(1));
@@ -216,7 +216,7 @@ impl Fitted {
 
     /// What the shared air does to the pulse, by these residuals of the fitted drones.
     fn air(&self, residual: &Pulses, found: &Found) -> Vec<Vec<f64>> {
-        shared_us(&self.patterns, residual, &self.doubts, &found.hyper)
+        shared_us(&self.patterns, residual, &self.doubts, &found.noise.hyper)
     }
 }
 
@@ -410,6 +410,7 @@ fn floor(
 
 #[cfg(test)]
 mod tests {
+    use super::super::gls::Start;
     use super::super::noise::WHITE;
     use super::super::refine::Parameter;
     use super::super::trial;
@@ -441,7 +442,7 @@ mod tests {
             felt: Vec::new(),
             parameters: vec![parameter],
             values: vec![(0.1, 0.01)],
-            hyper: Hyper::default(),
+            noise: Start::default(),
             gusts_mps: 0.2,
             updraft_mps: 0.0,
             was_in_updraft: false,

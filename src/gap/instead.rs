@@ -72,12 +72,15 @@ pub(super) fn fewer_instead(
     let flown = |options: &Options| setting.search(options);
     let ended = |options: &Options| Ended::of(options, &bins, flown);
     let nothing = Options { most_steps: 0, each_flown: true, ..*options };
-    let effects = rivals(&found.steps, by_leans);
+    let mut effects = rivals(&found.steps, by_leans);
+    // What was found goes on where others are beaten, so it takes longest, and begins first.
+    let known = leads(&found);
+    effects.sort_by_key(|effect| !known.iter().any(|one| one == effect));
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
     let by = |only: Only| alone(options, only);
     let each =
         effects.into_iter().map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats }));
-    let all: Vec<Options> = std::iter::once(nothing).chain(each).collect();
+    let all: Vec<Options> = each.chain([nothing]).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     let Decided { ended, names } = decided(Ended { found, nats, only: None, left: None }, others);

@@ -196,8 +196,8 @@ impl Question<'_> {
         let updraft_mps = if is_still { 0.0 } else { found.updraft_mps };
         let comparison = Comparison::of(train, repaired, simulated, plan, updraft_mps, None)?;
         let steps = found.steps.into_iter().filter_map(|step| withdrawn(step, before)).collect();
-        let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
-        Ok(Found { hyper, gusts_mps, updraft_mps, steps, rest, ..Found::nothing(comparison) })
+        let (noise, gusts_mps, rest) = (found.noise, found.gusts_mps, found.rest);
+        Ok(Found { noise, gusts_mps, updraft_mps, steps, rest, ..Found::nothing(comparison) })
     }
 }
 

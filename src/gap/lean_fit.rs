@@ -9,7 +9,7 @@ use super::gusts::{Gusts, Seen};
 use super::lean::LeanLaw;
 use super::memory::{Digest, Memory};
 use crate::numeric::mean;
-use crate::numeric::{differences, minimise, minimise_roughly};
+use crate::numeric::{differences_at_once, minimise, minimise_roughly};
 
 /// Laws that were fitted: the wind of a comparison is read until it stays, and then once more with all that it tells.
 static FITTED: Memory<Fitted> = Memory::of(1_000);
@@ -197,38 +197,20 @@ impl Leans {
     /// Minus the logarithm of their likelihood, without its constant: each lean is the law's in the mean wind, and gusts
     /// change it by the law's slopes there. (The other way round, from leans to the wind, a law without a linear part has
     /// no slope where a lean is small.) `sizes` are the standard deviations of the gusts along both axes, of the growth of
-    /// the wind with height, and of what else lasts; `more` is what the latter change a lean, rad, by.
-    pub(super) fn misfit_nats<const N: usize>(
+    /// the wind with height, and of what else lasts; `more` is what the latter change a lean, rad, by. Of several laws at
+    /// once: each waits for its own last moment, and meanwhile the others go on.
+    pub(super) fn misfits_nats<const N: usize, const LAWS: usize>(
         &self,
-        of: &InAir,
-        sizes: [f64; N],
+        of: &[(InAir, [f64; N]); LAWS],
         more: impl Fn(&Point, f64) -> [f64; N],
-    ) -> f64 {
-        let mut gusts = Gusts::new(sizes);
+    ) -> [f64; LAWS] {
+        let mut gusts = of.map(|(_, sizes)| Gusts::new(sizes));
         for (point, (decay, aloft)) in self.points.iter().zip(self.decay.iter().zip(&self.aloft)) {
-            let [vx, vy, climb_mps] = point.velocity_mps;
-            let air = [vx - of.mean_mps[0], vy - of.mean_mps[1]];
-            let wanted = of.law.lean(air, climb_mps);
-            let slopes = of.law.slopes(air, climb_mps);
-            let scatter =
-                if point.moves { of.scatter_rad.hypot(UNSETTLED_RAD) } else { of.scatter_rad };
-            let more_mps = of.mean_mps.map(|mean_mps| mean_mps * aloft);
-            let seen = [0, 1].map(|axis| {
-                let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
-                let mut looks_at = more(point, wanted[axis]);
-                let growth = by_air[0] * more_mps[0] + by_air[1] * more_mps[1];
-                for (place, look) in [by_air[0], by_air[1], growth].into_iter().enumerate() {
-                    looks_at[place] = look;
-                }
-                Seen {
-                    off: point.lean_rad[axis] - wanted[axis],
-                    looks_at,
-                    variance: scatter * scatter,
-                }
-            });
-            gusts.see(*decay, seen);
+            for ((of, _), gusts) in of.iter().zip(&mut gusts) {
+                gusts.see(*decay, of.seen(point, *aloft, &more));
+            }
         }
-        gusts.misfit_nats()
+        gusts.map(|gusts| gusts.misfit_nats())
     }
 }
 
@@ -237,15 +219,29 @@ pub(super) fn usable(model: LeanLaw) -> LeanLaw {
     LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model }
 }
 
+/// Misfits with the wall, for several sets of variables at once.
+fn walled<const SETS: usize>(
+    leans: &Leans,
+    at: &[[f64; COUNT]; SETS],
+    model: LeanLaw,
+    lacks: Lacks,
+) -> [f64; SETS] {
+    let mut misfits = misfits(leans, at, model, lacks);
+    misfits.iter_mut().zip(at).for_each(|(misfit, at)| *misfit += wall(at, lacks));
+    misfits
+}
+
 /// The most probable variables and their misfit.
 fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
-    let objective = |at: &[f64; COUNT]| misfit(leans, at, model, lacks) + wall(at, lacks);
+    let objective = |at: &[f64; COUNT]| walled(leans, &[*at], model, lacks)[0];
+    let slopes = |at: &[f64; COUNT], value: f64| {
+        differences_at_once(|all| walled(leans, all, model, lacks), at, value)
+    };
     let search = |drag: &f64| {
         let mut start =
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
         let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).air.law);
         (start[0], start[1]) = (x, y);
-        let slopes = |at: &[f64; COUNT], value| differences(objective, at, value);
         let end = minimise_roughly(start, None, ROUGH_NATS, objective, slopes);
         (end.at, end.value)
     };
@@ -258,16 +254,17 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     };
     let ends: Vec<([f64; COUNT], f64)> = starts.par_iter().map(search).collect();
     let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
-    bottom(best.unwrap_or(([0.0; COUNT], f64::INFINITY)), objective)
+    bottom(best.unwrap_or(([0.0; COUNT], f64::INFINITY)), objective, slopes)
 }
 
 /// The bottom under a place with its misfit, nats: searched for again from where each search ends.
 pub(super) fn bottom<const N: usize>(
     mut best: ([f64; N], f64),
     objective: impl Fn(&[f64; N]) -> f64,
+    slopes: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> ([f64; N], f64) {
     for _ in 0..AGAIN {
-        let next = minimise(best.0, &objective, |at, value| differences(&objective, at, value));
+        let next = minimise(best.0, &objective, &slopes);
         let gained = best.1 - next.1;
         if gained > 0.0 {
             best = next;
@@ -301,6 +298,32 @@ pub(super) struct InAir {
 }
 
 impl InAir {
+    /// The leans at a point, which is so much higher than the mean in the logarithm of its height, as its gusts, the growth of
+    /// the wind and `more` change them.
+    fn seen<const N: usize>(
+        &self,
+        point: &Point,
+        aloft: f64,
+        more: impl Fn(&Point, f64) -> [f64; N],
+    ) -> [Seen<N>; 2] {
+        let [vx, vy, climb_mps] = point.velocity_mps;
+        let air = [vx - self.mean_mps[0], vy - self.mean_mps[1]];
+        let wanted = self.law.lean(air, climb_mps);
+        let slopes = self.law.slopes(air, climb_mps);
+        let scatter =
+            if point.moves { self.scatter_rad.hypot(UNSETTLED_RAD) } else { self.scatter_rad };
+        let more_mps = self.mean_mps.map(|mean_mps| mean_mps * aloft);
+        [0, 1].map(|axis| {
+            let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
+            let mut looks_at = more(point, wanted[axis]);
+            let growth = by_air[0] * more_mps[0] + by_air[1] * more_mps[1];
+            for (place, look) in [by_air[0], by_air[1], growth].into_iter().enumerate() {
+                looks_at[place] = look;
+            }
+            Seen { off: point.lean_rad[axis] - wanted[axis], looks_at, variance: scatter * scatter }
+        })
+    }
+
     /// Twice the nats that its gusts and scatter cost for being other than usual.
     pub(super) fn unusual(&self) -> f64 {
         let gusts = (self.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln();
@@ -330,15 +353,30 @@ impl Candidate {
 
 /// Minus the logarithm of the posterior density, without its constant.
 fn misfit(leans: &Leans, at: &[f64; COUNT], model: LeanLaw, lacks: Lacks) -> f64 {
-    let of = Candidate::of(at, model, lacks);
+    misfits(leans, &[*at], model, lacks)[0]
+}
+
+/// As [`misfit`], of several sets of variables at once.
+fn misfits<const SETS: usize>(
+    leans: &Leans,
+    at: &[[f64; COUNT]; SETS],
+    model: LeanLaw,
+    lacks: Lacks,
+) -> [f64; SETS] {
+    let of = at.map(|at| Candidate::of(&at, model, lacks));
+    let airs =
+        of.each_ref().map(|Candidate { air, .. }| (*air, [air.gust_mps, air.gust_mps, SHEAR]));
+    let mut misfits = leans.misfits_nats(&airs, |_, _| [0.0; 3]);
     let square = |value: f64| value * value;
-    let drag = match lacks {
-        Lacks::Rotors => (of.air.law.linear - model.linear) / LINEAR_DOUBT,
-        Lacks::Body => at[DRAG] * BODY_UNIT / BODY_DOUBT,
-    };
-    let known = square((of.square.max(1e-7) / model.square).ln() / SQUARE_DOUBT) + square(drag);
-    let sizes = [of.air.gust_mps, of.air.gust_mps, SHEAR];
-    leans.misfit_nats(&of.air, sizes, |_, _| [0.0; 3]) + 0.5 * (known + of.air.unusual())
+    for ((misfit, of), at) in misfits.iter_mut().zip(&of).zip(at) {
+        let drag = match lacks {
+            Lacks::Rotors => (of.air.law.linear - model.linear) / LINEAR_DOUBT,
+            Lacks::Body => at[DRAG] * BODY_UNIT / BODY_DOUBT,
+        };
+        let known = square((of.square.max(1e-7) / model.square).ln() / SQUARE_DOUBT) + square(drag);
+        *misfit += 0.5 * (known + of.air.unusual());
+    }
+    misfits
 }
 
 /// Cost of a drag by which a drone would lean against the wind, nats.
@@ -421,6 +459,15 @@ mod tests {
             let off = found.law.linear - law().linear;
             assert!(off.abs() < 4e-4, "{shear}: {off} rad/(m/s)");
         }
+    }
+
+    #[test]
+    fn several_laws_at_once_are_each_as_alone() {
+        let leans = Leans::of(flown(law(), 0.14));
+        let sets = [0.2, 0.9, 1.7].map(|drag| [-4.0, 1.0, drag, 2.0, -0.5, -6.0]);
+        let at_once = walled(&leans, &sets, law(), Lacks::Rotors);
+        let alone = sets.map(|at| walled(&leans, &[at], law(), Lacks::Rotors)[0]);
+        assert_eq!(at_once.map(f64::to_bits), alone.map(f64::to_bits));
     }
 
     #[test]

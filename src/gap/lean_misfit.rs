@@ -6,7 +6,7 @@ use super::lean::LeanLaw;
 use super::lean_fit::{
     GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, bottom, hovering_wind, usable,
 };
-use crate::numeric::most;
+use crate::numeric::{differences_at_once, most};
 
 /// Standard deviation of the linear part of a model's law: as a share, as bodies may differ from the model by some tenths,
 /// and rad/(m/s). Chosen.
@@ -33,7 +33,7 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
     let fastest_mps = most(climbs).unwrap_or_default().max(1.0);
     let (share, least) = LINEAR_DOUBT;
     let linear_doubt = (share * model.linear).hypot(least);
-    let objective = |at: &[f64; COUNT]| {
+    let in_air = |at: &[f64; COUNT]| {
         let law = LeanLaw {
             linear: model.linear + at[2] * linear_doubt,
             square: model.square * (at[3] * SQUARE_DOUBT).exp(),
@@ -41,16 +41,28 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
         };
         let (gust_mps, scatter_rad) = (at[4].exp(), at[5].exp());
         let air = InAir { mean_mps: [at[0], at[1]], law, gust_mps, scatter_rad };
-        let sizes = [gust_mps, gust_mps, SHEAR, FORM_SHARE, FORM_SHARE];
-        let likely = leans.misfit_nats(&air, sizes, |point, lean_rad| {
-            let along = point.velocity_mps[2] / fastest_mps;
-            [0.0, 0.0, 0.0, lean_rad * along, lean_rad * (2.0 * along * along - 1.0)]
-        });
-        likely + 0.5 * (at[2] * at[2] + at[3] * at[3] + air.unusual())
+        (air, [gust_mps, gust_mps, SHEAR, FORM_SHARE, FORM_SHARE])
+    };
+    let of_form = |point: &Point, lean_rad: f64| {
+        let along = point.velocity_mps[2] / fastest_mps;
+        [0.0, 0.0, 0.0, lean_rad * along, lean_rad * (2.0 * along * along - 1.0)]
+    };
+    let rare = |at: &[f64; COUNT]| {
+        let (air, _) = in_air(at);
+        0.5 * (at[2] * at[2] + at[3] * at[3] + air.unusual())
+    };
+    let objective = |at: &[f64; COUNT]| leans.misfits_nats(&[in_air(at)], of_form)[0] + rare(at);
+    let slopes = |at: &[f64; COUNT], value: f64| {
+        let all = |all: &[[f64; COUNT]; COUNT]| {
+            let mut misfits = leans.misfits_nats(&all.each_ref().map(in_air), of_form);
+            misfits.iter_mut().zip(all).for_each(|(misfit, at)| *misfit += rare(at));
+            misfits
+        };
+        differences_at_once(all, at, value)
     };
     let [x, y] = hovering_wind(&leans.points, model);
     let start = [x, y, 0.0, 0.0, GUST_MPS.ln(), SCATTER_RAD.ln()];
-    let (_, nats) = bottom((start, f64::INFINITY), objective);
+    let (_, nats) = bottom((start, f64::INFINITY), objective, slopes);
     if nats.is_finite() { COUNTED * nats } else { 0.0 }
 }
 

@@ -241,7 +241,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
 }
 
 fn noise(found: &Found) -> Result<Noise, GapError> {
-    let hyper = &found.hyper;
+    let hyper = &found.noise.hyper;
     Ok(Noise {
         shared_air_mps: hyper.get(SHARED),
         shared_air_s: hyper.get(SHARED_TIME),
@@ -521,7 +521,10 @@ mod tests {
     fn what_held_out_drones_do_moves_the_gap_and_never_the_fit() {
         let (clean, poisoned) = (explained(0.0), explained(6.0));
         assert_eq!(poisoned.verdict.data.held_out, [3, 7]);
-        assert_eq!(poisoned.found.hyper, clean.found.hyper, "the noise is that of the others");
+        assert_eq!(
+            poisoned.found.noise.hyper, clean.found.noise.hyper,
+            "the noise is that of the others"
+        );
         assert_eq!(poisoned.verdict.rest, clean.verdict.rest, "so is what is left to be found");
         let gap = |explained: &Explained| explained.verdict.gap.drones.unwrap().before_us.value;
         assert!(gap(&clean) < 1.0, "{}", gap(&clean));

@@ -106,7 +106,7 @@ impl Zero {
             let per_size = doubt.clone();
             *doubt = per_size.each(|group, drone, bin| error * per_size.at(group, drone, bin));
         }
-        let solution = Problem::new(&patterns, &split).doubting(&doubts).at(&found.hyper);
+        let solution = Problem::new(&patterns, &split).doubting(&doubts).at(&found.noise.hyper);
         let variance_us2 = solution.covariance()[(0, 0)];
         Ok(Self { us: solution.beta[0], variance_us2 })
     }

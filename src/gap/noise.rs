@@ -291,24 +291,23 @@ impl Whitener {
                 }
             })
             .collect();
-        let means = Filter::new(shared_states(groups, hyper), observations);
+        let of_drones = |(index, group): (usize, &GroupPattern)| {
+            let bins = 0..group.time_s.len();
+            let observations = bins.map(|bin| Observation {
+                time_s: group.time_s[bin],
+                looks_at: looks(index, bin, 0),
+                noise: white,
+            });
+            Filter::new(own_states(hyper, 1.0).to_vec(), observations.collect())
+        };
+        let (means, deviations) = rayon::join(
+            || Filter::new(shared_states(groups, hyper), observations),
+            || groups.iter().enumerate().map(of_drones).collect::<Vec<Filter>>(),
+        );
         let mut log_det = means.log_det;
-        let deviations: Vec<Filter> = groups
-            .iter()
-            .enumerate()
-            .map(|(index, group)| {
-                let observations: Vec<Observation> = (0..group.time_s.len())
-                    .map(|bin| Observation {
-                        time_s: group.time_s[bin],
-                        looks_at: looks(index, bin, 0),
-                        noise: white,
-                    })
-                    .collect();
-                let filter = Filter::new(own_states(hyper, 1.0).to_vec(), observations);
-                log_det += filter.log_det * group.drones.saturating_sub(1) as f64;
-                filter
-            })
-            .collect();
+        for (filter, group) in deviations.iter().zip(groups) {
+            log_det += filter.log_det * group.drones.saturating_sub(1) as f64;
+        }
         let drones = groups.iter().map(|group| group.drones).collect();
         Self { order, means, deviations, drones, log_det }
     }

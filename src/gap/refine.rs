@@ -7,7 +7,7 @@ use super::candidates::set;
 use super::compare::Comparison;
 use super::error::GapError;
 use super::generic::form_doubts;
-use super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
 use super::noise::{GroupPattern, Hyper, SHARED, SHARED_TIME};
 use super::pack;
 use super::power_channel;
@@ -60,7 +60,7 @@ pub(super) struct Fit {
     /// The vehicle with the fitted values.
     pub vehicle: Vehicle,
     /// Parameters of the noise by restricted likelihood.
-    pub hyper: Hyper,
+    pub noise: Start,
     /// Value and standard error of each parameter.
     pub values: Vec<(f64, f64)>,
 }
@@ -110,7 +110,7 @@ pub(super) fn refine(
     vehicle: &Vehicle,
     parameters: &[Parameter],
     extras: &[Column],
-    start: Hyper,
+    start: &Start,
     gusts_mps: f64,
     fit_noise: bool,
 ) -> Result<Fit, GapError> {
@@ -180,11 +180,11 @@ fn refine_free(
     mut vehicle: Vehicle,
     (all, parameters): (&[Parameter], &[Parameter]),
     extras: &[Column],
-    start: Hyper,
+    start: &Start,
     gusts_mps: f64,
     fit_noise: bool,
 ) -> Result<Fit, GapError> {
-    let mut hyper = start;
+    let mut noise = start.clone();
     let mut last = None;
     let mut shifts: Vec<Vec<f64>> = Vec::new();
     let mut flown = vehicle.clone();
@@ -206,11 +206,13 @@ fn refine_free(
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
         let is_fitted = fit_noise && (round == 0 || round == 2);
         let solution = match is_fitted {
-            true if round == 0 => fit_from_both(&problem, hyper),
-            true => problem.fit(hyper, Likelihood::Restricted),
-            false => problem.at(&hyper),
+            true if round == 0 => fit_from_both(&problem, &noise),
+            true => problem.fit(&noise, Likelihood::Restricted),
+            false => problem.at(&noise.hyper),
         };
-        hyper = solution.hyper;
+        if is_fitted {
+            noise = Start::from(&solution);
+        }
         shifts = shifted(&patterns, &problem, &solution).into_iter().map(|p| p.shift_mps).collect();
         let first = solution.beta.len() - parameters.len();
         let covariance = solution.covariance();
@@ -229,7 +231,7 @@ fn refine_free(
             // A value that the vehicle cannot have stops there.
             flies_with(comparison, &mut vehicle, parameter, next);
         }
-        last = Some(Fit { vehicle: vehicle.clone(), hyper, values });
+        last = Some(Fit { vehicle: vehicle.clone(), noise: noise.clone(), values });
         if moved < 0.05 && (round >= 2 || !fit_noise) {
             break;
         }
@@ -239,9 +241,9 @@ fn refine_free(
 
 /// Noise by restricted likelihood, from the present one. In calm air the noise that a model had to have before it knew what
 /// was found now can be one that no small step makes likelier: so from the beginning, too, and the likelier is taken.
-fn fit_from_both(problem: &Problem<'_>, start: Hyper) -> Solution {
+fn fit_from_both(problem: &Problem<'_>, start: &Start) -> Solution {
     let near = problem.fit(start, Likelihood::Restricted);
-    if near.hyper.get(SHARED) > CALM_MPS || start == Hyper::default() {
+    if near.hyper.get(SHARED) > CALM_MPS || start.hyper == Hyper::default() {
         return near;
     }
     let anew = problem.fit(Hyper::default(), Likelihood::Restricted);
@@ -474,6 +476,22 @@ mod tests {
     }
 
     #[test]
+    fn noise_is_fitted_on_by_the_curvature_that_was_found() {
+        let data = trial::data(3, |drone, bin| {
+            0.3 * f64::from((5 * bin.segment as i32 + drone as i32) % 3 - 1)
+        });
+        let comparison = trial::comparison(&data);
+        let fitted = |start: &Start| {
+            refine(&comparison, &trial::vehicle(), &[], &[], start, 0.0, true).unwrap().noise
+        };
+        let first = fitted(&Start::default());
+        assert_ne!(first, Start::from(first.hyper), "it knows how the likelihood bends");
+        let again = fitted(&first);
+        let moved = again.hyper.0.iter().zip(&first.hyper.0).map(|(a, b)| (a - b).abs());
+        assert!(moved.fold(0.0, f64::max) < 0.3, "it was there: {again:?} {first:?}");
+    }
+
+    #[test]
     fn a_sag_has_the_exponent_that_the_logged_power_tells() {
         let data = power_channel::tests::flown(0.6, 0.0, 0.1, power_channel::tests::motors);
         let comparison = trial::comparison(&data);
@@ -482,7 +500,7 @@ mod tests {
         let battery = find("battery").unwrap().definition();
         let of = |name: &str| parameter(battery, name).unwrap();
         let fitted = |parameters: &[Parameter]| {
-            refine(&comparison, &vehicle, parameters, &[], Hyper::default(), 0.0, false).unwrap()
+            refine(&comparison, &vehicle, parameters, &[], &Start::default(), 0.0, false).unwrap()
         };
         let fit = fitted(&[of("exponent")]);
         let [(exponent, se)] = fit.values[..] else { panic!("{:?}", fit.values) };

@@ -41,7 +41,7 @@ pub(super) fn regimes(
     let start = before.residual(&before.vehicle, found.gusts_mps)?;
     let end = after.residual(&found.vehicle, found.gusts_mps)?;
     let patterns = after.patterns(&found.vehicle, found.gusts_mps)?;
-    let whitener = Whitener::new(&patterns, &found.hyper);
+    let whitener = Whitener::new(&patterns, &found.noise.hyper);
     let draws: Vec<Pulses> = (0..DRAWS)
         .map(|index| {
             let mut rng = stream(seed, index as u64, Purpose::Resampling);
@@ -50,7 +50,7 @@ pub(super) fn regimes(
         .collect();
     let (flat_start, flat_end) = (centred(&start), centred(&end));
     let responses: Vec<Vec<f64>> =
-        patterns.iter().map(|group| group.responses(&found.hyper)).collect();
+        patterns.iter().map(|group| group.responses(&found.noise.hyper)).collect();
     let mut rows = Vec::new();
     for axis in axes(after) {
         let by_drone = axis.by.is_of_drones();

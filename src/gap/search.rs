@@ -9,7 +9,7 @@ use super::decide::CLASS_NATS;
 use super::dependence::Dependence;
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
-use super::noise::{GroupPattern, Hyper};
+use super::noise::GroupPattern;
 use super::response::{Response, add_to, settled};
 use crate::base::rng::{Purpose, stream};
 
@@ -42,7 +42,7 @@ pub(super) struct Ranked {
     /// Largest minus smallest of what it does to the pulse, us.
     pub range_us: f64,
     /// Noise with it in the model.
-    pub hyper: Hyper,
+    pub noise: Start,
     /// Whether the noise was fitted anew.
     pub fitted: bool,
 }
@@ -63,7 +63,7 @@ pub(super) struct RankedGeneric {
     /// Largest minus smallest of what it does to the pulse, us.
     pub range_us: f64,
     /// Noise with it in the model.
-    pub hyper: Hyper,
+    pub noise: Start,
 }
 
 /// What a round found.
@@ -125,15 +125,15 @@ pub(super) fn round_on(
         // The noise has more than one likeliest place, and what a candidate leads to may be better for none, too.
         let by_effect = found.library.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
         let by_shape = found.generics.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
-        let best = by_effect.map(|one| (one.gain, one.hyper)).into_iter();
-        let best = best.chain(by_shape.map(|one| (one.gain, one.hyper)));
-        let Some((gain, hyper)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        let best = by_effect.map(|one| (one.gain, &one.noise)).into_iter();
+        let best = best.chain(by_shape.map(|one| (one.gain, &one.noise)));
+        let Some((gain, noise)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
         if gain < FLOOR_NATS {
             break;
         }
         let groups = found.groups.clone();
         let there = problem.among(&groups);
-        let again = based(&there, hyper, settles);
+        let again = based(&there, noise, settles);
         if again.1.log_posterior() < found.base.log_posterior() + BETTER_NATS {
             break;
         }
@@ -193,6 +193,11 @@ pub(super) fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) ->
     beta > 0.0 && beta <= MOST_BETA
 }
 
+/// How much the best of what is sought gains in the noise as it is, nats.
+pub(super) fn gains_at_once(base: &Solution, sought: Sought<'_>) -> f64 {
+    scan(base, sought).first().map_or(0.0, |best| best.gain)
+}
+
 /// What each candidate gains, in its best size, in each of its two best forms.
 fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
     let mut ranked: Vec<Ranked> = Vec::new();
@@ -211,7 +216,7 @@ fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
                 beta: gain.beta,
                 size_us: gain.beta.abs() * variant.column.spread(sought.drones),
                 range_us: gain.beta.abs() * variant.column.range(),
-                hyper: base.hyper,
+                noise: Start::from(base),
                 fitted: false,
             };
             match forms.iter_mut().find(|(form, _)| *form == variant.form) {
@@ -275,7 +280,7 @@ fn refit(
         beta,
         size_us: beta.abs() * variant.column.spread(sought.drones),
         range_us: beta.abs() * variant.column.range(),
-        hyper: with.hyper,
+        noise: Start::from(&with),
         fitted: true,
         ..ranked.clone()
     }
@@ -307,7 +312,7 @@ fn free_shapes(
     for (index, generic) in sought.generics.iter().enumerate() {
         let (beta, nats) = base.gain_of_all(&generic.columns);
         let gain = nats - generic.penalty;
-        let hyper = base.hyper;
+        let noise = Start::from(base);
         let found = RankedGeneric {
             generic: index,
             gain,
@@ -315,7 +320,7 @@ fn free_shapes(
             beta,
             size_us: 0.0,
             range_us: 0.0,
-            hyper,
+            noise,
         };
         let same =
             |other: &RankedGeneric| sought.generics[other.generic].depends_on == generic.depends_on;
@@ -363,7 +368,7 @@ fn free_shapes(
                 gain,
                 plain,
                 beta: with.beta[first..].to_vec(),
-                hyper: with.hyper,
+                noise: Start::from(&with),
                 ..found.clone()
             }
         })
@@ -505,7 +510,7 @@ mod tests {
         let groups = patterns();
         let split = Split::of(&pulses(&groups));
         let problem = Problem::new(&groups, &split);
-        let base = problem.at(&Hyper::default());
+        let base = problem.at(&Start::default().hyper);
         let sought = Sought { library: &[], generics: &[], drones: &[3, 2] };
         // Nothing is looked for, so that nothing is found; and not one flight says nothing.
         for replicates in [0, 3] {
@@ -535,7 +540,7 @@ mod tests {
             beta: Vec::new(),
             size_us: 3.0,
             range_us: 3.0,
-            hyper: Hyper::default(),
+            noise: Start::default(),
         }
     }
 
@@ -570,7 +575,7 @@ mod tests {
         let told = |own: usize, other: (usize, f64)| {
             let own = ranked(own, 60.0);
             let generics = vec![own.clone(), ranked(other.0, other.1)];
-            let base = problem.at(&Hyper::default());
+            let base = problem.at(&Start::default().hyper);
             let round = Round { groups: groups.clone(), base, library: Vec::new(), generics };
             told_of(&round, sought, &own)
         };

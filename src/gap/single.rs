@@ -84,7 +84,7 @@ fn gains(found: &Found, size: usize) -> Result<[f64; 2], GapError> {
     let own = sizes.remove(size);
     let curves = climb_shapes(&comparison.scene, CLIMB_ORDERS);
     let problem = Problem::new(&patterns, &residual).doubting(&doubts).with(&found.extras);
-    let solution = problem.with(&sizes).at(&found.hyper);
+    let solution = problem.with(&sizes).at(&found.noise.hyper);
     Ok([solution.gain(&own).nats, solution.gain_of_all(&curves).1])
 }
 
@@ -128,7 +128,7 @@ fn best_rival(step: &Step, effect: &str) -> Option<String> {
 /// Names with a size at the end of what the effect can have, or that may be none: the fit wanted something else, and
 /// the rival that explains most stands for it.
 fn at_their_bounds(found: &mut Found) {
-    let half = half_interval(&found.comparison, &found.hyper);
+    let half = half_interval(&found.comparison, &found.noise.hyper);
     for step in &mut found.steps {
         let Some(effect) = new_name(step).map(str::to_owned) else { continue };
         // What leans bound is told by them.

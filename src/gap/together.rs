@@ -10,8 +10,7 @@ use super::contest::{Contest, Free, before, entered};
 use super::decide::{CLASS_NATS, What};
 use super::dependence::signals_of;
 use super::error::GapError;
-use super::gls::{Column, Problem};
-use super::noise::Hyper;
+use super::gls::{Column, Problem, Start};
 use super::refine::{Parameter, parameters_of};
 use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, admissible};
 use crate::effects::{Role, Signal};
@@ -84,7 +83,7 @@ impl Contest<'_> {
                 self.sought.library[*index].variants[*variant].updraft_mps.is_none()
             })
             .collect();
-        let at = problem.at(&free.hyper);
+        let at = problem.at(&free.noise.hyper);
         let mut sets: Vec<Set> = subsets(&forms)
             .par_iter()
             .filter_map(|chosen| {
@@ -97,7 +96,7 @@ impl Contest<'_> {
                     .iter()
                     .zip(&columns)
                     .zip(betas)
-                    .map(|((place, column), beta)| self.ranked(*place, column, beta, free.hyper))
+                    .map(|((place, column), beta)| self.ranked(*place, column, beta, &free.noise))
                     .collect();
                 let nats = nats - FLOOR_NATS * chosen.len() as f64;
                 Some(Set { members: members?, nats })
@@ -121,7 +120,7 @@ impl Contest<'_> {
         (candidate, variant): (usize, usize),
         column: &Column,
         beta: f64,
-        hyper: Hyper,
+        noise: &Start,
     ) -> Option<Ranked> {
         let of = &self.sought.library[candidate];
         admissible(of, &of.variants[variant], beta).then(|| Ranked {
@@ -132,7 +131,7 @@ impl Contest<'_> {
             beta,
             size_us: beta.abs() * column.spread(self.sought.drones),
             range_us: beta.abs() * column.range(),
-            hyper,
+            noise: noise.clone(),
             fitted: true,
         })
     }
@@ -159,18 +158,18 @@ impl Contest<'_> {
         let Self { found, comparison, sought, round, .. } = self;
         let mut vehicle = found.vehicle.clone();
         let mut parameters: Vec<Parameter> = found.parameters.clone();
-        let mut hyper = found.hyper;
+        let mut noise = &found.noise;
         for member in members {
             let candidate = &sought.library[member.candidate];
             vehicle = joined(vehicle, candidate, member);
-            hyper = member.hyper;
+            noise = &member.noise;
             if !parameters.iter().any(|known| known.effect == candidate.name) {
                 let of = before(candidate);
                 let more = parameters_of(comparison, &vehicle, candidate.name, of, &round.base)?;
                 parameters.extend(more);
             }
         }
-        self.in_full(comparison, vehicle, &parameters, Free::default(), hyper)
+        self.in_full(comparison, vehicle, &parameters, Free::default(), noise)
     }
 }
 

@@ -3,7 +3,8 @@
 use super::bins::{Bin, BinValues};
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Group};
-use super::noise::{GroupPattern, Hyper};
+use super::gls::Start;
+use super::noise::GroupPattern;
 use super::response::Response;
 use super::search::Ranked;
 use super::verdict::{Finding, Rival, Step};
@@ -112,7 +113,7 @@ pub(super) fn ranked(candidate: usize, gain: f64) -> Ranked {
         beta: 1.0,
         size_us: 3.0,
         range_us: 3.0,
-        hyper: Hyper::default(),
+        noise: Start::default(),
         fitted: true,
     }
 }

@@ -167,13 +167,18 @@ pub(crate) fn differences<const N: usize>(
     at: &[f64; N],
     value: f64,
 ) -> [f64; N] {
-    let mut gradient = [0.0; N];
-    gradient.iter_mut().enumerate().for_each(|(index, slope)| {
-        let mut moved = *at;
-        moved[index] += STEP;
-        *slope = (function(&moved) - value) / STEP;
-    });
-    gradient
+    differences_at_once(|moved| moved.map(|place| function(&place)), at, value)
+}
+
+/// As [`differences`], of a function that is told for all places at once.
+pub(crate) fn differences_at_once<const N: usize>(
+    function: impl Fn(&[[f64; N]; N]) -> [f64; N],
+    at: &[f64; N],
+    value: f64,
+) -> [f64; N] {
+    let mut moved = [*at; N];
+    moved.iter_mut().enumerate().for_each(|(index, place)| place[index] += STEP);
+    function(&moved).map(|there| (there - value) / STEP)
 }
 
 fn identity<const N: usize>() -> [[f64; N]; N] {

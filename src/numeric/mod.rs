@@ -28,7 +28,7 @@ mod order;
 pub(crate) use banded::Banded;
 pub use line::Line;
 pub(crate) use minimise::{
-    Inverse, Least, differences, minimise, minimise_known, minimise_roughly,
+    Inverse, Least, differences, differences_at_once, minimise, minimise_known, minimise_roughly,
 };
 pub(crate) use moments::log_sum;
 pub use moments::{Moments, mean, rms};

@@ -6,7 +6,7 @@ use super::super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::super::error::GapError;
 use super::super::gls::{Column, Likelihood, Problem, Solution, Split, Start};
 use super::super::model_flights::View;
-use super::super::noise::{GroupPattern, Hyper};
+use super::super::noise::GroupPattern;
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
 use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
@@ -14,12 +14,16 @@ use super::{Found, In, Look, MOST_GUSTS_MPS, Only, SAME_GUSTS_MPS, Search};
 
 impl Search<'_> {
     /// What is left in the updraft in which one effect explains the flight best: an updraft that was settled in without
-    /// it can have stood for it.
-    pub(super) fn look_where_it_explains_most(&mut self, only: Only) -> Result<Look, GapError> {
+    /// it can have stood for it. `None`: that is out of reach in all of them.
+    pub(super) fn look_where_it_explains_most(
+        &mut self,
+        only: Only,
+    ) -> Result<Option<Look>, GapError> {
         let (first, begin) = (self.comparison.clone(), self.found.clone());
         let bins = first.data.bins_of_groups();
         // Without the effect, an updraft in which it is none may explain more than any in which it is one does at first.
         let mut best: Option<((bool, f64), Look, Comparison, Found)> = None;
+        let mut is_far = false;
         let mut starts = [&[0.0, only.updraft_mps], &UPDRAFTS_MPS[..]].concat();
         starts.dedup();
         for updraft_mps in starts {
@@ -31,6 +35,10 @@ impl Search<'_> {
                 _ => continue,
             }
             let look = self.look_at_beginning()?;
+            if only.is_out_of_reach(look.at_most_nats()) {
+                is_far = true;
+                continue;
+            }
             let share = updraft_mps / UPDRAFT_DOUBT_MPS;
             let explained = look.explained();
             let by = (explained.lacks_effect, explained.nats - 0.5 * share * share);
@@ -40,10 +48,10 @@ impl Search<'_> {
         }
         let Some((_, look, comparison, found)) = best else {
             (self.comparison, self.found) = (first, begin);
-            return self.look(In::Present(None));
+            return if is_far { Ok(None) } else { self.look(In::Present(None)).map(Some) };
         };
         (self.comparison, self.found) = (comparison, found);
-        Ok(look)
+        Ok(Some(look))
     }
 
     /// What is left in the updraft that explains most, or in still air with the effect that explains most: what
@@ -149,7 +157,7 @@ impl Search<'_> {
 
     /// Goes into the updraft in which the flight of the present model is likeliest, with sizes that are fitted there, if
     /// that explains more; whether it did. A size that was fitted in another updraft keeps the search there.
-    pub(super) fn goes_where_it_is_likelier(&mut self, hyper: Hyper) -> Result<bool, GapError> {
+    pub(super) fn goes_where_it_is_likelier(&mut self, start: &Start) -> Result<bool, GapError> {
         let before_nats = self.found.explains()?;
         let beaten_nats = self.options.only.map_or(f64::NEG_INFINITY, |only| only.beaten_nats);
         if before_nats < beaten_nats - BEATEN_NATS {
@@ -157,7 +165,7 @@ impl Search<'_> {
         }
         let nats = self.climbs(before_nats)?;
         let went = nats > before_nats;
-        let noise = Start::from(if went { self.found.hyper } else { hyper });
+        let noise = if went { self.found.noise.clone() } else { start.clone() };
         let of = |updraft_mps: f64| self.likely_in(updraft_mps, &noise);
         let here = all_of(of, &[self.found.updraft_mps]);
         let here_nats = here.first().map_or(NOWHERE, |here| here.0);
@@ -182,7 +190,7 @@ impl Search<'_> {
             free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
             let at_mps = found.updraft_mps;
             let Some(here) =
-                InUpdraft::fitted(comparison, &patterns, found, &free, &found.hyper.into(), at_mps)
+                InUpdraft::fitted(comparison, &patterns, found, &free, &found.noise, at_mps)
             else {
                 break;
             };
@@ -386,6 +394,8 @@ struct StepMps {
     begins_mps: f64,
     /// Steps that are shorter are none.
     ends_mps: f64,
+    /// Places by parabolas, at most.
+    parabolas: usize,
 }
 
 /// How much something is at some places.
@@ -398,9 +408,9 @@ fn all_of(of: impl Fn(f64) -> Option<f64> + Sync, places: &[f64]) -> Vec<(f64, f
 fn most_beside(
     of: impl Fn(f64) -> Option<f64> + Sync,
     mut tried: Vec<(f64, f64)>,
-    StepMps { begins_mps, ends_mps }: StepMps,
+    StepMps { begins_mps, ends_mps, parabolas }: StepMps,
 ) -> Option<(f64, f64)> {
-    for _ in 0..PARABOLAS {
+    for _ in 0..parabolas {
         let best = most_of(&tried)?;
         let side = |sign: f64| {
             let beyond = tried.iter().filter(|one| sign * (one.1 - best.1) > 0.0);
@@ -559,13 +569,11 @@ const STILL_MPS: f64 = 0.05;
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
 /// How the updraft of the likeliest flight is found: down to half of what a flight tells of it at best. Numerical.
-const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03 };
+const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03, parabolas: 6 };
 /// The same with what was found already: rougher, as all sizes are fitted anew where it leads to.
-const ROUGH_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.12 };
-/// The same where the model itself is nearest.
-const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03 };
-/// Places by parabolas, at most. Numerical.
-const PARABOLAS: usize = 6;
+const ROUGH_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.12, parabolas: 6 };
+/// The same where the model itself is nearest: what is likeliest farther away than two steps is found from afar.
+const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03, parabolas: 3 };
 /// What cannot be flown is as unlikely as this.
 const NOWHERE: f64 = f64::NEG_INFINITY;
 /// A flight that is less likely than what was found by this much is not looked for elsewhere, nats. Chosen: of 27 that were in
@@ -657,5 +665,22 @@ mod tests {
         assert_eq!(found(&[0.0, -1.0, 1.0]), Some(1.3));
         assert_eq!(found(&[0.6]), Some(1.3));
         assert_eq!(near(&[-3.0]), None);
+        // Beside the nearest flight it is not climbed far.
+        let (_, beside) = most_beside(hill, all_of(hill, &[0.0]), NEAR_STEP).unwrap();
+        assert!((beside - 3.0 * NEAR_STEP.begins_mps).abs() < 1e-9, "{beside}");
+    }
+
+    #[test]
+    fn an_updraft_in_which_an_effect_is_out_of_reach_is_left_out() {
+        let looks = |beaten_nats: f64| {
+            let only = Only { effect: "battery", updraft_mps: 0.0, beaten_nats };
+            let (seen, _) = in_air(0.6, |search| {
+                search.look_where_it_explains_most(only).unwrap().map(|look| look.explained().nats)
+            });
+            seen
+        };
+        let near = looks(f64::NEG_INFINITY).unwrap();
+        assert_eq!(looks(near), Some(near), "as well explained as what was found");
+        assert_eq!(looks(near + 1e4), None);
     }
 }
