@@ -28,7 +28,7 @@ pub(super) enum In<'a> {
 }
 
 /// In its own noise an effect gains more than at once, in the noise without it, which is larger: by no more than this, nats, beside
-/// [`MOST_TIMES`] as much. Chosen: of 40 looks one gained more, by 26 nats, in an updraft that was out of reach by 500.
+/// [`MOST_TIMES`] as much. Chosen: of 40 looks two gained more, by 26 nats at most, in updrafts that were out of reach by 600.
 const MOST_NATS: f64 = 300.0;
 /// See [`MOST_NATS`].
 const MOST_TIMES: f64 = 4.0;
