@@ -314,17 +314,16 @@ impl<'a> Aware<'a> {
             height_m: second.height_m,
             resting_v,
         };
-        let mut one = self.corrections.refer(&raw, pack, self.slope);
         if self.corrections.lean_table.is_some() {
             // What wind does depends on the air that is looked for: at 7 m/s the pulse answers
             // climbs half as strongly again as in still air, or more.
             for _ in 0..CLIMB_ROUNDS {
-                let Some(air_mps) = values.air_mps(one.pulse_us) else { break };
+                let pulse = self.corrections.pulse(&raw, pack);
+                let Some(air_mps) = values.air_mps(pulse) else { break };
                 raw.climb_mps += CLIMB_STEP * (air_mps - raw.climb_mps);
-                one = self.corrections.refer(&raw, pack, self.slope);
             }
         }
-        (one, raw)
+        (self.corrections.refer(&raw, pack, self.slope), raw)
     }
 
     /// Noise of a mean over one second, us; `slope`: pulse per vertical speed, us/(m/s).

@@ -244,19 +244,22 @@ fn widened(points: &[LawPoint], added_us: f64) -> Vec<LawPoint> {
 /// Standard deviation to add to every point's error so that the better law's reduced chi² is 1
 /// (Paule and Mandel 1982); 0 when it is below 1 already, `None` without degrees of freedom.
 fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
-    let best = |added_us: f64| -> Option<f64> {
+    // `None` where neither law has a chi².
+    let is_too_little = |added_us: f64| -> Option<bool> {
         let points = widened(points, added_us);
-        let scale = ErrorScale::Unscaled;
-        [law::linear(&points, scale).ok(), law::signed_quadratic(&points, scale).ok()]
-            .into_iter()
-            .filter_map(|fit| fit?.chi2_reduced)
-            .min_by(f64::total_cmp)
+        let chi2 = |fit: Result<Fit, FitError>| fit.ok()?.chi2_reduced;
+        let linear = chi2(law::linear(&points, ErrorScale::Unscaled));
+        if linear.is_some_and(|chi2| chi2 <= 1.0) {
+            return Some(false);
+        }
+        let quadratic = chi2(law::signed_quadratic(&points, ErrorScale::Unscaled));
+        linear.into_iter().chain(quadratic).min_by(f64::total_cmp).map(|least| least > 1.0)
     };
-    if best(0.0)? <= 1.0 {
+    if !is_too_little(0.0)? {
         return Some(0.0);
     }
     let (mut low, mut high) = (0.0, 1.0);
-    while best(high)? > 1.0 {
+    while is_too_little(high)? {
         (low, high) = (high, high * 2.0);
         if high > 1e4 {
             return None;
@@ -264,7 +267,7 @@ fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
     }
     for _ in 0..24 {
         let middle = f64::midpoint(low, high);
-        if best(middle)? > 1.0 { low = middle } else { high = middle }
+        if is_too_little(middle)? { low = middle } else { high = middle }
     }
     Some(high)
 }

@@ -162,6 +162,19 @@ impl Corrections<'_> {
         sigmas
     }
 
+    /// The pulse with what is known taken away, as [`Self::refer`] has it.
+    pub(super) fn pulse(&self, raw: &Raw, pack: Option<&Pack>) -> f64 {
+        let level_us = match (self.leaning, self.lean_table) {
+            (Some(leaning), _) => leaning.level_us(raw.pulse_us, raw.lean_deg),
+            (None, Some(table)) => raw.pulse_us - table.at(raw.lean_deg, raw.climb_mps),
+            (None, None) => raw.pulse_us,
+        };
+        let pulse_us =
+            self.density.map_or(level_us, |density| density.refer_us(level_us, raw.height_m));
+        let referred = pack.zip(raw.resting_v).map(|(pack, rest_v)| pack.refer(pulse_us, rest_v));
+        referred.map_or(pulse_us, |(referred_us, _)| referred_us) / self.per_us()
+    }
+
     /// Takes away what is known.
     pub(super) fn refer(&self, raw: &Raw, pack: Option<&Pack>, slope: f64) -> Referred {
         let mut pulse_us = raw.pulse_us;
@@ -278,6 +291,28 @@ mod tests {
         assert!(log_density < 0.0);
         assert!((high.pulse_us - (1000.0 + 540.0 * (0.4 * log_density).exp())).abs() < 1e-9);
         assert!((high.doubts_us[DENSITY] - (high.pulse_us - 1000.0) * log_density).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_pulse_alone_is_that_which_everything_known_was_taken_from() {
+        let leaning = Leaning { thrust_exponent: 1.0, drag_speed_mps: 38.0 };
+        let table = LeanTable {
+            lean_step_deg: 5.0,
+            climb_step_mps: 1.0,
+            change_us: vec![vec![0.0; 2], vec![-10.0, -8.0]],
+            ..LeanTable::default()
+        };
+        let density = Density { ground_amsl_m: 190.0, exponent: 0.4, indicator: Indicator::Pulse };
+        let raw = Raw { time_s: 200.0, height_m: 60.0, ..flown() };
+        for (leaning, lean_table) in [(Some(leaning), None), (None, Some(&table)), (None, None)] {
+            for (density, unit) in [(None, None), (Some(density), None), (Some(density), Some(2.5))]
+            {
+                let corrections =
+                    Corrections { leaning, lean_table, density, unit, ..Corrections::default() };
+                let referred = corrections.refer(&raw, None, SLOPE);
+                assert_eq!(corrections.pulse(&raw, None), referred.pulse_us);
+            }
+        }
     }
 
     #[test]

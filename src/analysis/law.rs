@@ -190,8 +190,7 @@ pub fn signed_quadratic_held(
     }
     let held = |w_mps: f64| Law::SignedQuadratic { a, u0_us, w_mps };
     let ((found, law), sigmas) = with_effective_variance(points, |sigmas| {
-        let chi2 = |w: f64| sum_of_squares(&residuals(points, sigmas, held(w)));
-        let profile: Vec<f64> = grid().map(chi2).collect();
+        let profile: Vec<f64> = grid().map(|w| chi2(points, sigmas, held(w))).collect();
         let mut minima: Vec<Solution> = minima_of(&profile)
             .filter_map(|start| minimize(|p| residuals(points, sigmas, held(p[0])), &[start]).ok())
             .collect();
@@ -265,15 +264,23 @@ fn with_effective_variance<T>(
     Ok((result, sigmas))
 }
 
-fn residuals(points: &[LawPoint], sigmas: &[f64], law: Law) -> Vec<f64> {
-    let residual = |(point, sigma): (&LawPoint, &f64)| {
+fn each_residual<'a>(
+    points: &'a [LawPoint],
+    sigmas: &'a [f64],
+    law: Law,
+) -> impl Iterator<Item = f64> + 'a {
+    let residual = move |(point, sigma): (&LawPoint, &f64)| {
         (point.pulse_us - law.pulse_us(point.velocity_mps)) / sigma
     };
-    points.iter().zip(sigmas).map(residual).collect()
+    points.iter().zip(sigmas).map(residual)
 }
 
-fn sum_of_squares(residuals: &[f64]) -> f64 {
-    residuals.iter().map(|residual| residual * residual).sum()
+fn residuals(points: &[LawPoint], sigmas: &[f64], law: Law) -> Vec<f64> {
+    each_residual(points, sigmas, law).collect()
+}
+
+fn chi2(points: &[LawPoint], sigmas: &[f64], law: Law) -> f64 {
+    each_residual(points, sigmas, law).map(|residual| residual * residual).sum()
 }
 
 /// Weighted straight line `u = slope x + constant` in closed form, centred for precision.
@@ -322,7 +329,7 @@ fn all_minima(points: &[LawPoint], sigmas: &[f64]) -> Result<Minima, FitError> {
         let regressor = |point: &LawPoint| signed_square(point.velocity_mps - w_mps);
         let (a, u0_us) = weighted_line(points, sigmas, regressor)?;
         let law = Law::SignedQuadratic { a, u0_us, w_mps };
-        Some((sum_of_squares(&residuals(points, sigmas, law)), [a, u0_us, w_mps]))
+        Some((chi2(points, sigmas, law), [a, u0_us, w_mps]))
     };
     let profiled: Vec<_> = grid().map(at).collect();
     let chi2: Vec<f64> =
@@ -433,7 +440,7 @@ fn describe(
     }
     let squares: f64 =
         points.iter().map(|p| (p.pulse_us - law.pulse_us(p.velocity_mps)).powi(2)).sum();
-    let chi2 = sum_of_squares(&residuals(points, sigmas, law));
+    let chi2 = chi2(points, sigmas, law);
     Fit {
         parameters,
         covariance,

@@ -85,7 +85,9 @@ pub(super) fn add(
             .with_constants(&aware.constants_us()),
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
-    let Some(found) = posterior(&input) else { return };
+    let (found, limit) =
+        rayon::join(|| posterior(&input), || known_air(shared).and_then(|air| best(&input, &air)));
+    let Some(found) = found else { return };
     let places = indices.clone();
     for (index, series) in indices.into_iter().zip(found.drones) {
         let Some(drone) = map.drones.get_mut(index) else { continue };
@@ -145,10 +147,9 @@ pub(super) fn add(
         zero_shift_mps: found.zero_shift_mps,
         uniform_probability: found.uniform_probability,
         truth: truth::check_posterior(&map.drones).map(|check| {
-            let best = known_air(shared).and_then(|air| best(&input, &air));
-            let limit_se_mps = best.as_ref().map(|best| best.mean_se_mps);
+            let limit_se_mps = limit.as_ref().map(|best| best.mean_se_mps);
             let at_limit =
-                best.and_then(|best| truth::at_limit(&map.drones, &places, &best.values));
+                limit.and_then(|best| truth::at_limit(&map.drones, &places, &best.values));
             TruthCheck {
                 limit_rms_mps: at_limit.map(|[limit, _]| limit),
                 at_limit_rms_mps: at_limit.map(|[_, own]| own),

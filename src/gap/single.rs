@@ -52,6 +52,7 @@ pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
     beside_inflow_and_drag_of_the_body(found);
+    what_another_finding_may_be(&mut found.steps);
     Ok(())
 }
 
@@ -107,6 +108,14 @@ fn new_name(step: &Step) -> Option<&str> {
     }
 }
 
+/// An effect that is named alone, new or with another size than the model's.
+fn lone_name(step: &Step) -> Option<&str> {
+    match &step.finding {
+        Finding::Name { effect, .. } => Some(effect),
+        _ => None,
+    }
+}
+
 /// Makes a class of a name and others, if there are any.
 fn doubt(step: &mut Step, others: impl IntoIterator<Item = String>) {
     let Finding::Name { effect, parameters, .. } = &step.finding else { return };
@@ -153,7 +162,8 @@ fn at_their_bounds(found: &mut Found) {
 }
 
 /// Names beside something unknown that may be the same: what was found together with it, and what depends on the same
-/// and explains hardly more.
+/// and explains hardly more. An effect that the model has, found after it with another size, may be what the free shape leaves of
+/// the unknown.
 fn beside_something_unknown(steps: &mut [Step]) {
     let unknown: Vec<(usize, Dependence, f64)> = steps
         .iter()
@@ -164,10 +174,12 @@ fn beside_something_unknown(steps: &mut [Step]) {
         })
         .collect();
     for (place, step) in steps.iter_mut().enumerate() {
-        let Some(effect) = new_name(step) else { continue };
+        let Some(effect) = lone_name(step) else { continue };
+        let is_new = new_name(step).is_some();
         let near = unknown.iter().find(|(of, depends_on, gain_nats)| {
             let alike = depends_on.may_show(effect);
-            *of < place || alike && *gain_nats > UNKNOWN_SHARE * step.gain_nats
+            let is_after = *of < place && (is_new || alike);
+            is_after || is_new && alike && *gain_nats > UNKNOWN_SHARE * step.gain_nats
         });
         let other = near.map(|(_, depends_on, _)| depends_on.name().to_owned());
         doubt(step, other);
@@ -240,6 +252,24 @@ fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
         if new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect)) {
             doubt(step, others.iter().cloned());
         }
+    }
+}
+
+/// Names of what another finding is in doubt to be: one effect does not explain two things, and what the other one is decides
+/// how much of this is left.
+fn what_another_finding_may_be(steps: &mut [Step]) {
+    let classes: Vec<Vec<String>> = steps
+        .iter()
+        .filter_map(|step| match &step.finding {
+            Finding::Class { effects, .. } => Some(effects.clone()),
+            Finding::Name { .. } | Finding::Unknown { .. } => None,
+        })
+        .collect();
+    for step in steps {
+        let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
+        let class = classes.iter().find(|effects| effects.contains(&effect));
+        let other = class.and_then(|effects| effects.iter().find(|other| **other != effect));
+        doubt(step, other.cloned());
     }
 }
 
@@ -350,6 +380,40 @@ mod tests {
             "it depends on something else"
         );
         assert_eq!(of(climb(), 9.0, name("battery"))[1], "battery climb", "found together with it");
+    }
+
+    #[test]
+    fn another_size_beside_something_unknown_may_be_a_part_of_it() {
+        let again = |effect: &str| {
+            let (effect, parameters) = (effect.to_owned(), Vec::new());
+            Finding::Name { effect, parameters, was_there: true }
+        };
+        let of = |first: Finding, then: Finding| {
+            let mut steps = vec![step(first, 60.0, 9.0, &[]), step(then, 50.0, 9.0, &[])];
+            beside_something_unknown(&mut steps);
+            told(&steps)
+        };
+        let product = || unknown(Dependence::ClimbTime);
+        assert_eq!(of(product(), again("parasitic-drag"))[1], "parasitic-drag climb-time");
+        assert_eq!(of(product(), again("mass-spread"))[1], "mass-spread", "told by offsets");
+        assert_eq!(of(again("parasitic-drag"), product())[0], "parasitic-drag", "found before");
+    }
+
+    #[test]
+    fn what_another_finding_may_be_is_not_named_alone() {
+        let class = |effects: &[&str]| Finding::Class {
+            effects: effects.iter().map(|one| (*one).to_owned()).collect(),
+            parameters: Vec::new(),
+        };
+        let of = |effects: &[&str]| {
+            let inflow = step(name("rotor-inflow"), 129.0, 20.0, &[]);
+            let mut steps = vec![inflow, step(class(effects), 26.0, 12.0, &[])];
+            what_another_finding_may_be(&mut steps);
+            told(&steps)
+        };
+        let both = ["rotor-inflow response-drift", "response-drift rotor-inflow"];
+        assert_eq!(of(&["response-drift", "rotor-inflow"]), both);
+        assert_eq!(of(&["response-drift", "climb"])[0], "rotor-inflow");
     }
 
     #[test]

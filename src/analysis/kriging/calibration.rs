@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Matrix2};
 use super::covariance::{Air, Covariance};
 use super::gradient::Plane;
 use super::scatter::Scatter;
+use super::windows::{Between, Met, StandIns};
 use crate::analysis::air_prior::Gls;
 use crate::analysis::shape::PARAMETERS;
 use crate::analysis::zero::{CellAt, Windows};
@@ -22,7 +23,7 @@ const STRENGTHS: [(f64, f64); 6] =
 /// much the air changed, and the weaker it is said to be, the worse that gets.
 const NOT_WEAKER_NATS: f64 = 12.0;
 /// How much longer the air is in height than on the level, with weights: turbulence is alike in all
-/// directions, thermals are tall.
+/// directions, thermals are tall. The first is alike.
 const TALLER: [(f64, f64); 2] = [(1.0, 0.5), (4.0, 0.5)];
 /// White scatter of the windows' averages besides their noise, us. A grid.
 const WHITES_US: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
@@ -35,14 +36,6 @@ const OWN_WHITE_US: f64 = 1.0;
 const MISFIT_MPS: f64 = 0.075;
 /// Climb speeds that differ by this differ in it, m/s.
 const MISFIT_CLIMB_MPS: f64 = 1.0;
-/// Drones that stand for all.
-const STAND_INS: usize = 6;
-/// Nodes of the mean over a window, as shares of its length from its middle on (Gauss and Legendre).
-const NODES: [f64; 2] = [-0.288_675_135, 0.288_675_135];
-
-/// Weight of each pair of them.
-const WEIGHT: f64 = 0.25;
-
 /// The law of the fleet in air of one kind.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
@@ -58,7 +51,7 @@ pub(super) struct Component {
 
 impl CellAt {
     /// Time and height at a share of the window's length from its middle on.
-    fn at(&self, share: f64) -> (f64, f64) {
+    pub(super) fn at(&self, share: f64) -> (f64, f64) {
         let by_s = share * self.span_s;
         (self.time_s + by_s, self.height_m + by_s * self.climb_mps)
     }
@@ -75,19 +68,15 @@ impl CellAt {
 /// The windows of a calibration with where the drones were.
 pub(in super::super) struct Calibration<'a> {
     windows: &'a Windows,
-    /// From each of some drones to each other of them, m: the covariance of *their* average is one, however the air
-    /// drifts, which a choice of pairs would not give.
-    pairs_m: Vec<[f64; 2]>,
+    stand_ins: StandIns,
+    /// The windows in air of each of [`TALLER`].
+    met: [Met; TALLER.len()],
     /// Where all drones were on the level, m.
     homes_m: &'a [[f64; 2]],
     /// Pulse per vertical air speed of the fleet, us/(m/s).
     slope: f64,
     /// How far windows are from the fleet's law by how fast they climb, (m/s)².
     misfit: DMatrix<f64>,
-    /// How many stand for all.
-    stand_ins: f64,
-    /// Drones in a window, on average.
-    drones: f64,
     /// How the drones' constants scatter; `None` for too few drones.
     scatter: Option<Scatter>,
 }
@@ -95,31 +84,20 @@ pub(in super::super) struct Calibration<'a> {
 impl<'a> Calibration<'a> {
     /// `homes_m` are the drones' places on the level, `slope` is the pulse per vertical air speed, us/(m/s).
     pub(in super::super) fn new(windows: &'a Windows, homes_m: &'a [[f64; 2]], slope: f64) -> Self {
-        let count = homes_m.len().min(STAND_INS);
-        // Spread over the list, and by no step that follows the rows of a grid.
-        let chosen =
-            (0..count).map(|index| (index as f64 * homes_m.len() as f64 / count as f64) as usize);
-        let stand_ins: Vec<[f64; 2]> =
-            chosen.filter_map(|index| homes_m.get(index).copied()).collect();
-        let mut pairs_m: Vec<[f64; 2]> = Vec::new();
-        for (index, one) in stand_ins.iter().enumerate() {
-            for other in &stand_ins[index + 1..] {
-                pairs_m.push([one[0] - other[0], one[1] - other[1]]);
-            }
-        }
         let cells = &windows.cells;
         let misfit = DMatrix::from_fn(cells.len(), cells.len(), |row, column| {
             cells[row].misfit(&cells[column])
         });
         let members = cells.iter().map(|cell| cell.drones as f64);
+        let drones = crate::numeric::mean(members).unwrap_or(1.0).max(1.0);
+        let stand_ins = StandIns::of(homes_m, drones);
         Self {
             windows,
-            pairs_m,
+            met: TALLER.map(|(taller, _)| Met::of(cells, &stand_ins, taller)),
+            stand_ins,
             homes_m,
             slope: slope.max(1.0),
             misfit,
-            stand_ins: count.max(1) as f64,
-            drones: crate::numeric::mean(members).unwrap_or(1.0).max(1.0),
             scatter: None,
         }
     }
@@ -136,58 +114,10 @@ impl<'a> Calibration<'a> {
         self.scatter.map_or(0.0, |scatter| scatter.ln_likelihood(by_air))
     }
 
-    /// Covariance of the averages over drones of the air in two windows, (m/s)²; and of one drone's own deviation from them,
-    /// by the field and by its own gusts.
-    fn air(
-        &self,
-        covariance: &Covariance,
-        one: &CellAt,
-        other: &CellAt,
-        taller: f64,
-    ) -> (f64, [f64; 2]) {
-        let gusts = covariance.gusts(one.time_s - other.time_s);
-        let over = |x_m: f64, y_m: f64| {
-            let mut sum = 0.0;
-            for at in NODES {
-                for other_at in NODES {
-                    let (time_s, height_m) = one.at(at);
-                    let (other_s, other_m) = other.at(other_at);
-                    let apart_m = [x_m, y_m, (height_m - other_m) / taller];
-                    sum += WEIGHT * covariance.instant(apart_m, time_s - other_s);
-                }
-            }
-            sum
-        };
-        let own = over(0.0, 0.0);
-        if self.pairs_m.is_empty() {
-            return (own + gusts, [0.0; 2]);
-        }
-        let both = |[x_m, y_m]: &[f64; 2]| {
-            let there = over(*x_m, *y_m);
-            there + if covariance.is_reversible() { there } else { over(-x_m, -y_m) }
-        };
-        let each = self.pairs_m.iter().map(both);
-        let shared = (own * self.stand_ins + each.sum::<f64>()) / self.stand_ins.powi(2);
-        let of_all = gusts / self.drones;
-        (shared + of_all, [own - shared, gusts - of_all])
-    }
-
-    /// The air between all windows.
-    fn between(&self, covariance: &Covariance, taller: f64) -> Between {
-        let cells = &self.windows.cells;
-        let mut found = Between::none(cells.len());
-        for row in 0..cells.len() {
-            for column in 0..=row {
-                let (shared, [by_field, by_gusts]) =
-                    self.air(covariance, &cells[row], &cells[column], taller);
-                for at in [(row, column), (column, row)] {
-                    found.shared[at] = shared;
-                    found.by_field[at] = by_field;
-                    found.by_gusts[at] = by_gusts;
-                }
-            }
-        }
-        found
+    /// The air between the windows, alike in all directions.
+    fn between(&self, covariance: &Covariance) -> Between {
+        let [alike, ..] = &self.met;
+        alike.between(covariance, &self.stand_ins)
     }
 
     /// The fleet's law under all that is left open in air of these scales.
@@ -195,8 +125,8 @@ impl<'a> Calibration<'a> {
         let covariance = Covariance::new(*air);
         let plane = Plane::of(&[covariance], self.homes_m);
         let mut found = Vec::new();
-        for (taller, tall_weight) in TALLER {
-            let air = self.between(&covariance, taller);
+        for (met, (_, tall_weight)) in self.met.iter().zip(TALLER) {
+            let air = met.between(&covariance, &self.stand_ins);
             let mut best = f64::NEG_INFINITY;
             for (strength, weight) in STRENGTHS {
                 let ln_weight = (weight * tall_weight).ln();
@@ -229,7 +159,7 @@ impl<'a> Calibration<'a> {
         let air: Vec<Covariance> = air.iter().copied().map(Covariance::new).collect();
         let mut all = Between::none(self.windows.cells.len());
         for part in &air {
-            let Between { shared, by_field, by_gusts } = self.between(part, 1.0);
+            let Between { shared, by_field, by_gusts } = self.between(part);
             all.shared += shared;
             all.by_field += by_field;
             all.by_gusts += by_gusts;
@@ -281,7 +211,7 @@ impl<'a> Calibration<'a> {
     /// drones' places, m/s.
     pub(super) fn own_mps(&self, air: &Air) -> f64 {
         let covariance = Covariance::new(*air);
-        let air = self.between(&covariance, 1.0);
+        let air = self.between(&covariance);
         let alone = |row, column| air.by_field[(row, column)] + air.by_gusts[(row, column)];
         let own = self.windows.record.fit_in(alone, OWN_WHITE_US).map(|fit| {
             let plane = Plane::of(&[covariance], self.homes_m);
@@ -317,25 +247,6 @@ impl<'a> Calibration<'a> {
             all += weight;
         }
         sum / all
-    }
-}
-
-/// Covariances of the air in the windows of a calibration, each with each, (m/s)².
-#[derive(Clone, Debug)]
-struct Between {
-    /// Of the averages over drones.
-    shared: DMatrix<f64>,
-    /// Of one drone's own deviation from them, by the field.
-    by_field: DMatrix<f64>,
-    /// The same by its own gusts.
-    by_gusts: DMatrix<f64>,
-}
-
-impl Between {
-    /// No air in so many windows.
-    fn none(windows: usize) -> Self {
-        let none = DMatrix::zeros(windows, windows);
-        Self { shared: none.clone(), by_field: none.clone(), by_gusts: none }
     }
 }
 

@@ -37,7 +37,7 @@ impl Form {
     pub(super) const ALL: [Self; 3] = [Self::Turbulent, Self::Exponential, Self::Gaussian];
 
     /// Minus the logarithm of the correlation by a distance or a time, by the square of that in units of its scale.
-    fn fall(self, square: f64) -> f64 {
+    pub(super) fn fall(self, square: f64) -> f64 {
         match self {
             // Faster than the root that rounds correctly.
             Self::Turbulent => (square.ln() / 3.0).exp(),
@@ -112,6 +112,11 @@ pub(super) struct Besides {
 }
 
 impl Besides {
+    /// Covariance of a drone's own gusts, (m/s)².
+    pub(super) fn gusts(&self) -> f64 {
+        self.gusts
+    }
+
     /// Covariance of the means of one drone, or of two, by that of the field, (m/s)².
     pub(super) fn with(&self, field: f64, is_own: bool) -> f64 {
         let air = if is_own { self.own_stretch * field + self.gusts } else { field };
@@ -140,9 +145,26 @@ impl Covariance {
         Self { air, inverse, slopes: 0.0 }
     }
 
+    /// The correlation of the field alone.
+    pub(super) fn alone(&self) -> Self {
+        let air = Air {
+            sd_mps: 1.0,
+            gust_mps: 0.0,
+            gust_s: 1.0,
+            slow_mps: 0.0,
+            shared_mps: 0.0,
+            ..self.air
+        };
+        Self { air, slopes: 0.0, ..*self }
+    }
+
     /// As drones show it whose laws have slopes of their own, with this standard error as a share.
     pub(super) fn shown(self, slope_share: f64) -> Self {
         Self { slopes: slope_share * slope_share, ..self }
+    }
+
+    pub(super) fn air(&self) -> &Air {
+        &self.air
     }
 
     /// Whether the past is as the future: where nothing drifts by.
@@ -221,14 +243,9 @@ impl Covariance {
     }
 
     /// Covariance of the slow part, which stays where it is and which means over 10 s do not change, (m/s)².
-    pub(super) fn slow(&self, [x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+    pub(super) fn slow(&self, way_m: [f64; 3], apart_s: f64) -> f64 {
         let slow_mps = self.air.slow_mps;
-        if slow_mps == 0.0 {
-            return 0.0;
-        }
-        slow_mps
-            * slow_mps
-            * (-(x * x + y * y + z * z).sqrt() / SLOW_M - apart_s.abs() / SLOW_S).exp()
+        if slow_mps == 0.0 { 0.0 } else { slow_mps * slow_mps * slow(way_m, apart_s) }
     }
 
     /// Covariance of the air itself, not of means, (m/s)².
@@ -250,10 +267,15 @@ impl Covariance {
         self.air.gust_mps.powi(2) * mean_exponential(apart_s, self.air.gust_s)
     }
 
+    /// A way on the level in lengths of the field along and across its stretch.
+    pub(super) fn in_lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.inverse;
+        [a * x + b * y, c * x + d * y]
+    }
+
     /// Square of the distance in units of the length.
     fn square(&self, [x, y, z]: [f64; 3]) -> f64 {
-        let [[a, b], [c, d]] = self.inverse;
-        let (along, across) = (a * x + b * y, c * x + d * y);
+        let [along, across] = self.in_lengths([x, y]);
         let up = z / self.air.length_m;
         along * along + across * across + up * up
     }
@@ -298,10 +320,20 @@ impl Apart<'_> {
     /// The same where the covariances by the way are known, which count if nothing drifts.
     pub(super) fn field_by(&self, way_m: [f64; 3], [field, slow]: [f64; 2]) -> f64 {
         match self.still {
-            Some(by_time) => field * by_time + slow * (-self.seconds.abs() / SLOW_S).exp(),
+            Some(by_time) => field * by_time + slow * slow_by_time(self.seconds),
             None => self.field(way_m),
         }
     }
+}
+
+/// Correlation of the slow part by time alone.
+pub(super) fn slow_by_time(apart_s: f64) -> f64 {
+    (-apart_s.abs() / SLOW_S).exp()
+}
+
+/// Correlation of the slow part, which stays where it is.
+pub(super) fn slow([x, y, z]: [f64; 3], apart_s: f64) -> f64 {
+    (-(x * x + y * y + z * z).sqrt() / SLOW_M - apart_s.abs() / SLOW_S).exp()
 }
 
 /// Mean of `exp(-|t|/tau)` over two windows of 10 s whose middles are so far apart.

@@ -6,9 +6,12 @@
 //! field says about its own mean, and about the errors that all drones share, is spread over the whole record: by 16
 //! neighbours the zero of a field of 200 m and 260 s is known to 0.23 m/s, and by all values to 0.17.
 
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
 use nalgebra::{DMatrix, DMatrixView};
 
-use super::covariance::Covariance;
+use super::covariance::{Air, Covariance, slow_by_time};
 use super::data::{COMMON, Drone, Rows};
 use super::vecchia::{Common, CommonVector, Parts, System};
 
@@ -25,8 +28,11 @@ const PRESENT_SHARE: f64 = 0.8;
 /// A record without this share of the values does not stand for it. Chosen.
 const KEPT_SHARE: f64 = 0.5;
 
+/// Fields that are remembered: one, and those that its gradient asks for. Numerical.
+const MOST_KNOWN: usize = 8;
+
 /// A record without gaps.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Blocks {
     /// Index of each channel's drone.
     drones: Vec<usize>,
@@ -34,12 +40,42 @@ pub(super) struct Blocks {
     ways_m: Vec<[f64; 3]>,
     way: DMatrix<usize>,
     noise_mps: Vec<f64>,
-    /// Of each step, the last one first: a row for each channel, with its value and what the common errors add to it.
+    /// Of each step, the last one first: a row for each channel, with its value and what those common errors add to it that are
+    /// not the same at all steps.
     records: DMatrix<f64>,
+    /// Which of the common errors these are.
+    varying: Vec<usize>,
+    /// What the others add to each channel; zero where they vary.
+    steady: DMatrix<f64>,
     steps: usize,
     step_s: f64,
     /// Steps that predict.
     order: usize,
+    known: Known,
+}
+
+/// Correlations of the last fields that were asked for.
+#[derive(Debug, Default)]
+struct Known(Mutex<VecDeque<(Air, usize, Arc<Vec<f64>>)>>);
+
+impl Known {
+    /// Of a field and a number of steps that predict.
+    fn find(&self, air: &Air, order: usize) -> Option<Arc<Vec<f64>>> {
+        let known = self.0.lock().ok()?;
+        let same = known.iter().find(|(of, steps, _)| of == air && *steps == order);
+        same.map(|(_, _, correlations)| Arc::clone(correlations))
+    }
+
+    fn keep(&self, air: Air, order: usize, correlations: Vec<f64>) -> Arc<Vec<f64>> {
+        let correlations = Arc::new(correlations);
+        if let Ok(mut known) = self.0.lock() {
+            known.push_back((air, order, Arc::clone(&correlations)));
+            if known.len() > MOST_KNOWN {
+                known.pop_front();
+            }
+        }
+        correlations
+    }
 }
 
 impl Blocks {
@@ -71,14 +107,26 @@ impl Blocks {
         let place_m = |drone: &usize| drones[*drone].place_at(0).unwrap_or_default();
         let channels = spread(&whole, size.drones, place_m);
         let row = |drone: usize, step: usize| Some(&rows.list[rows.place[drone][step]?]);
-        let mut records = DMatrix::zeros(steps.len() * channels.len(), 1 + COMMON);
+        let first = |drone: &usize| row(*drone, steps.start).map(|row| row.common);
+        let first: Vec<[f64; COMMON]> = channels.iter().filter_map(first).collect();
+        let varies = |column: &usize| {
+            let same = |step: usize, (drone, first): (&usize, &[f64; COMMON])| {
+                row(*drone, step).is_some_and(|row| row.common[*column] == first[*column])
+            };
+            !steps.clone().all(|step| channels.iter().zip(&first).all(|each| same(step, each)))
+        };
+        let varying: Vec<usize> = (0..COMMON).filter(varies).collect();
+        let steady = DMatrix::from_fn(channels.len(), COMMON, |channel, column| {
+            if varying.contains(&column) { 0.0 } else { first[channel][column] }
+        });
+        let mut records = DMatrix::zeros(steps.len() * channels.len(), 1 + varying.len());
         for (block, step) in steps.clone().rev().enumerate() {
             for (channel, drone) in channels.iter().enumerate() {
                 let row = row(*drone, step)?;
                 let place = block * channels.len() + channel;
                 records[(place, 0)] = row.value_mps;
-                for column in 0..COMMON {
-                    records[(place, 1 + column)] = row.common[column];
+                for (index, column) in varying.iter().enumerate() {
+                    records[(place, 1 + index)] = row.common[*column];
                 }
             }
         }
@@ -96,25 +144,47 @@ impl Blocks {
             noise_mps: channels.iter().map(noise).collect(),
             drones: channels,
             records,
+            varying,
+            steady,
             steps: steps.len(),
             step_s: (rows.seconds[1] - rows.seconds[0]) as f64,
             order,
+            known: Known::default(),
         })
+    }
+
+    /// Correlations of the field over all ways, for no step, one, and so on. Most of the differences of a gradient are by scales
+    /// that they do not hang on.
+    fn correlations(&self, covariance: &Covariance, order: usize) -> Arc<Vec<f64>> {
+        let alone = covariance.alone();
+        if let Some(known) = self.known.find(alone.air(), order) {
+            return known;
+        }
+        let by_way: Vec<[f64; 2]> = self.ways_m.iter().map(|way_m| alone.by_way(*way_m)).collect();
+        let mut found = Vec::with_capacity((order + 1) * by_way.len());
+        for lag in 0..=order {
+            let apart = alone.apart(lag as f64 * self.step_s);
+            let each = self.ways_m.iter().zip(&by_way);
+            found.extend(each.map(|(way_m, by_way)| apart.field_by(*way_m, *by_way)));
+        }
+        self.known.keep(*alone.air(), order, found)
     }
 
     /// Covariances of all channels with all channels so many steps before, (m/s)²: that of the most steps first.
     fn lagged(&self, covariance: &Covariance, order: usize) -> DMatrix<f64> {
         let n = self.drones.len();
         let mut stacked = DMatrix::zeros((order + 1) * n, n);
-        let by_way: Vec<[f64; 2]> =
-            self.ways_m.iter().map(|way_m| covariance.by_way(*way_m)).collect();
+        let correlations = self.correlations(covariance, order);
+        let variance = covariance.air().sd_mps.powi(2);
+        let slow: Vec<f64> = self.ways_m.iter().map(|way_m| covariance.slow(*way_m, 0.0)).collect();
         let mut fields = vec![0.0; self.ways_m.len()];
         for lag in 0..=order {
             let apart_s = lag as f64 * self.step_s;
             let besides = covariance.besides(apart_s);
-            let apart = covariance.apart(apart_s);
-            for (field, (way_m, by_way)) in fields.iter_mut().zip(self.ways_m.iter().zip(&by_way)) {
-                *field = apart.field_by(*way_m, *by_way);
+            let still = slow_by_time(apart_s);
+            let at_lag = &correlations[lag * slow.len()..];
+            for (field, (correlation, slow)) in fields.iter_mut().zip(at_lag.iter().zip(&slow)) {
+                *field = variance * correlation + slow * still;
             }
             let mut block = stacked.rows_mut((order - lag) * n, n);
             for channel in 0..n {
@@ -142,7 +212,8 @@ impl Blocks {
         let mut predictor = Predictor::new(lagged, n, covariance.is_reversible());
         let mut parts = Parts::new(n);
         let mut square = DMatrix::zeros(n, n);
-        let mut left = DMatrix::zeros(n, 1 + COMMON);
+        let mut left = DMatrix::zeros(n, self.records.ncols());
+        let mut common = DMatrix::zeros(n, COMMON);
         for step in 0..self.steps {
             if step <= order {
                 if step > 0 {
@@ -150,6 +221,7 @@ impl Blocks {
                 }
                 let white = predictor.factor()?.solve_lower_triangular(&predictor.of_constants)?;
                 square = white.tr_mul(&white);
+                common.gemm(1.0, &white, &self.steady, 0.0);
                 predictor.white_constants = white;
             }
             let block = self.steps - 1 - step;
@@ -158,7 +230,9 @@ impl Blocks {
             left.gemm(-1.0, &predictor.ahead(), &before, 1.0);
             predictor.factor()?.solve_lower_triangular_mut(&mut left);
             let value = left.column(0);
-            let common = left.columns(1, COMMON);
+            for (index, column) in self.varying.iter().enumerate() {
+                common.set_column(*column, &left.column(1 + index));
+            }
             parts.squares += value.norm_squared();
             parts.ln_sd += predictor.ln_sd;
             parts.information +=

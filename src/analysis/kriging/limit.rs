@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::covariance::{Air, Covariance};
 use super::data::{COMMON, Drone, Row, Rows};
 use super::make::{Input, prior_factor};
+use super::pairs::Pairs;
 use crate::analysis::running::RUNNING_S;
 
 /// More values than this are thinned: the cost grows with the third power. Numerical.
@@ -50,9 +51,11 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Limit> {
     let component = input.calibration.known(air)?;
     let own_mps = air.iter().fold(0.0_f64, |sum, air| sum.hypot(input.calibration.own_mps(air)));
     let mut of_air = DMatrix::zeros(n, n);
+    let pairs: Vec<Pairs<'_>> =
+        covariances.iter().map(|covariance| Pairs::of_all(covariance, &rows)).collect();
     for (row, one) in rows.list.iter().enumerate() {
         for (column, other) in rows.list[..=row].iter().enumerate() {
-            let value = covariances.iter().map(|air| air.of(&one.spot, &other.spot)).sum();
+            let value = pairs.iter().map(|air| air.of_values(&one.spot, &other.spot)).sum();
             of_air[(row, column)] = value;
             of_air[(column, row)] = value;
         }

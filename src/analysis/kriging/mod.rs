@@ -28,6 +28,7 @@ mod moving;
 #[cfg(test)]
 mod moving_tests;
 mod neighbours;
+mod pairs;
 mod predict;
 mod predicted;
 mod sampling;
@@ -39,6 +40,8 @@ mod thermals;
 #[cfg(test)]
 mod thousands_tests;
 mod vecchia;
+mod ways;
+mod windows;
 
 pub(super) use calibration::Calibration;
 pub(super) use covariance::{Air, Form};

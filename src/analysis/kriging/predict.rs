@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::covariance::Covariance;
 use super::data::{COMMON, Drone, Rows, UNIFORM};
 use super::neighbours::{Reach, around};
+use super::pairs::Pairs;
 use super::vecchia::{Common, CommonVector, Weights, weights};
 use crate::analysis::running::RUNNING_S;
 
@@ -127,8 +128,9 @@ impl Model<'_> {
     ) {
         let rows = Rows::of(self.drones, phase, step);
         let near = around(self.drones, &rows, sites, REACH);
+        let pairs = Pairs::of(&self.covariance, &rows);
         let weights: Vec<Option<Weights>> =
-            near.patterns.iter().map(|pattern| weights(pattern, &self.covariance, false)).collect();
+            near.patterns.par_iter().map(|pattern| weights(pattern, &pairs, false)).collect();
         let left: Vec<f64> = rows
             .list
             .iter()

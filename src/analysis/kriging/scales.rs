@@ -10,7 +10,7 @@ use super::dense::Dense;
 use super::levinson::{Blocks, Size};
 use super::neighbours::Neighbours;
 use super::vecchia::{Common, CommonVector, System};
-use crate::numeric::{Inverse, Least, differences, minimise_roughly};
+use crate::numeric::{Inverse, Least, minimise_roughly};
 
 /// Scales that are searched, mostly as logarithms.
 pub(super) const SCALES: usize = 10;
@@ -77,7 +77,7 @@ const NATS: f64 = 5.0;
 const COARSE_NATS: f64 = 12.0;
 
 /// A search ends where two steps gain less than this, nats. Numerical: points are drawn around a top, not from it.
-const ENOUGH: f64 = 2e-3;
+pub(super) const ENOUGH: f64 = 2e-3;
 /// The same of one that only finds where another begins.
 const COARSE_ENOUGH: f64 = 0.05;
 
@@ -86,7 +86,7 @@ const LEAST_REACH: f64 = 0.5;
 /// See [`Axis::reach`]. Numerical.
 const MOST_REACH: f64 = 3.0;
 /// Values that are solved at once.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) enum Whole {
     /// Of drones that stand still, at equal steps of time.
     Blocks(Blocks),
@@ -108,7 +108,7 @@ pub(super) const FINE: Extent =
     Extent { blocks: Size { drones: 16, operations: 12e6 }, values: 300 };
 /// What the search begins with.
 pub(super) const COARSE: Extent =
-    Extent { blocks: Size { drones: 9, operations: 2e6 }, values: 100 };
+    Extent { blocks: Size { drones: 9, operations: 6e5 }, values: 100 };
 
 impl Whole {
     /// Of a record of these drones.
@@ -158,11 +158,10 @@ pub(super) struct Family {
 }
 
 impl Family {
-    /// All of them, where there is a wind or none is known.
-    fn all(in_wind: bool) -> Vec<Self> {
+    /// All of a form, where there is a wind or none is known.
+    fn all(form: Form, in_wind: bool) -> Vec<Self> {
         let drifts: &[bool] = if in_wind { &[false, true] } else { &[false] };
-        let of = |form| drifts.iter().map(move |drifts| Self { form, drifts: *drifts });
-        Form::ALL.into_iter().flat_map(of).collect()
+        drifts.iter().map(|drifts| Self { form, drifts: *drifts }).collect()
     }
 
     /// Where the search for its scales begins: those of a field day, of gusts that drift over slow air, and of air that lasts
@@ -290,13 +289,38 @@ impl Search<'_> {
         std::array::from_fn(|index| if slopes[index].is_finite() { slopes[index] } else { 0.0 })
     }
 
-    /// The most probable scales from a start, by some of the values where that is enough to begin with.
-    fn climb(&self, family: Family, start: Point) -> Top {
+    /// The most probable scales from a start, by some of the values where that is enough to begin with; a search for those of a
+    /// field that falls otherwise knows the curvature.
+    fn climb(&self, family: Family, start: Point, alike: Option<&Top>) -> Top {
         let some = Search { whole: self.coarse.or(self.whole), ..*self };
         let loss = |point: &Point| -some.log_posterior(family, point);
-        let slopes = |at: &Point, value| differences(loss, at, value);
+        let slopes = |at: &Point, value| some.slopes(family, at, value);
         let enough = if self.coarse.is_some() { COARSE_ENOUGH } else { ENOUGH };
-        Top::of(family, minimise_roughly(start, None, enough, loss, slopes))
+        let alike = alike.map(|top| &top.inverse);
+        Top::of(family, minimise_roughly(start, alike, enough, loss, slopes))
+    }
+
+    /// Where searches from all starts end.
+    fn climbed(&self, in_wind: bool) -> Vec<Top> {
+        let starts: Vec<(Family, Point)> = Family::all(Form::default(), in_wind)
+            .into_iter()
+            .flat_map(|family| {
+                let starts = family.starts(self.lasting_mps);
+                starts.into_iter().map(move |start| (family, start))
+            })
+            .collect();
+        let first: Vec<Top> =
+            starts.par_iter().map(|(family, start)| self.climb(*family, *start, None)).collect();
+        let others: Vec<Form> =
+            Form::ALL.into_iter().filter(|form| *form != Form::default()).collect();
+        let of_form = |form: Form| {
+            let each = starts.par_iter().zip(&first);
+            each.map(move |((family, start), alike)| {
+                self.climb(Family { form, ..*family }, *start, Some(alike))
+            })
+        };
+        let rest: Vec<Top> = others.into_par_iter().flat_map(of_form).collect();
+        first.into_iter().chain(rest).collect()
     }
 
     /// The most probable scales, over families and starts.
@@ -308,18 +332,9 @@ impl Search<'_> {
     /// The most probable scales of each family that is not much less probable than another, the most probable first.
     pub(super) fn all(&self) -> Vec<Found> {
         let drifts = self.wind_mps.is_some_and(|[u, v]| u.hypot(v) > CALM_MPS);
-        let families = Family::all(drifts);
-        let starts: Vec<(Family, Point)> = families
-            .iter()
-            .flat_map(|family| {
-                let starts = family.starts(self.lasting_mps);
-                starts.into_iter().map(move |start| (*family, start))
-            })
-            .collect();
-        let climbed: Vec<Top> =
-            starts.par_iter().map(|(family, start)| self.climb(*family, *start)).collect();
+        let climbed = self.climbed(drifts);
+        let families = Form::ALL.into_iter().flat_map(|form| Family::all(form, drifts));
         let mut tops: Vec<Top> = families
-            .into_iter()
             .filter_map(|family| {
                 let own =
                     climbed.iter().filter(|top| top.family == family && top.value.is_finite());

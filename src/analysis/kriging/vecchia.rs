@@ -2,10 +2,12 @@
 //! all drones share and constants of their own.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, SVector};
+use rayon::prelude::*;
 
 use super::covariance::Covariance;
 use super::data::{COMMON, Rows};
 use super::neighbours::{Neighbours, Pattern};
+use super::pairs::Pairs;
 use crate::numeric::Banded;
 
 /// Square matrix over the common errors.
@@ -25,17 +27,13 @@ pub(super) struct Weights {
 }
 
 /// Weights of a pattern, for its target's value or (without noise) the air itself; `None` where rounding leaves no positive definite covariance.
-pub(super) fn weights(
-    pattern: &Pattern,
-    covariance: &Covariance,
-    with_noise: bool,
-) -> Option<Weights> {
+pub(super) fn weights(pattern: &Pattern, pairs: &Pairs<'_>, with_noise: bool) -> Option<Weights> {
     let Pattern { target, neighbours, target_noise_mps, noise_mps } = pattern;
     let n = neighbours.len();
     let own = if with_noise {
-        covariance.of(target, target) + target_noise_mps * target_noise_mps
+        pairs.of_values(target, target) + target_noise_mps * target_noise_mps
     } else {
-        covariance.with_air(target, target)
+        pairs.with_air(target, target)
     };
     if n == 0 {
         return Some(Weights { of: Vec::new(), variance: own });
@@ -43,18 +41,18 @@ pub(super) fn weights(
     let mut matrix = DMatrix::zeros(n, n);
     for row in 0..n {
         for column in 0..row {
-            let value = covariance.of(&neighbours[row], &neighbours[column]);
+            let value = pairs.of_values(&neighbours[row], &neighbours[column]);
             matrix[(row, column)] = value;
             matrix[(column, row)] = value;
         }
         matrix[(row, row)] =
-            covariance.of(&neighbours[row], &neighbours[row]) + noise_mps[row] * noise_mps[row];
+            pairs.of_values(&neighbours[row], &neighbours[row]) + noise_mps[row] * noise_mps[row];
     }
     let to = DVector::from_fn(n, |row, _| {
         if with_noise {
-            covariance.of(target, &neighbours[row])
+            pairs.of_values(target, &neighbours[row])
         } else {
-            covariance.with_air(target, &neighbours[row])
+            pairs.with_air(target, &neighbours[row])
         }
     });
     let of = matrix.cholesky()?.solve(&to);
@@ -178,8 +176,9 @@ impl System {
         covariance: &Covariance,
         own_mps: &[f64],
     ) -> Option<Self> {
+        let pairs = Pairs::of(covariance, rows);
         let weights: Option<Vec<Weights>> =
-            neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
+            neighbours.patterns.par_iter().map(|pattern| weights(pattern, &pairs, true)).collect();
         let weights = weights?;
         let mut parts = Parts::new(own_mps.len());
         let mut constants: Vec<(usize, f64)> = Vec::new();
@@ -286,8 +285,9 @@ pub(super) fn innovations(
     covariance: &Covariance,
     values_mps: &[f64],
 ) -> Vec<f64> {
+    let pairs = Pairs::of(covariance, rows);
     let weights: Vec<Option<Weights>> =
-        neighbours.patterns.iter().map(|pattern| weights(pattern, covariance, true)).collect();
+        neighbours.patterns.par_iter().map(|pattern| weights(pattern, &pairs, true)).collect();
     (0..rows.list.len())
         .map(|index| {
             let Some(weights) = &weights[neighbours.of[index]] else { return f64::NAN };

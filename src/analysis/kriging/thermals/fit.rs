@@ -8,7 +8,8 @@ use super::shape::{
 };
 use super::whiten::{White, Whitening};
 use crate::analysis::kriging::data::Rows;
-use crate::numeric::{differences, minimise};
+use crate::analysis::kriging::scales::ENOUGH;
+use crate::numeric::{Least, differences, minimise_roughly};
 
 /// A peak before the values are seen: standard deviation, m/s. Thermals that small drones fly in; chosen.
 const PEAK_MPS: f64 = 2.0;
@@ -244,9 +245,10 @@ impl Fit<'_> {
             .par_iter()
             .map(|(start, at_s)| {
                 let loss = |numbers: &Numbers| -self.log_density(numbers, *at_s);
-                let (best, least) =
-                    minimise(*start, loss, |at, value| differences(loss, at, value));
-                (best, *at_s, -least)
+                let slopes = |at: &Numbers, value| differences(loss, at, value);
+                let Least { at, value: least, .. } =
+                    minimise_roughly(*start, None, ENOUGH, loss, slopes);
+                (at, *at_s, -least)
             })
             .filter(|top| top.2.is_finite())
             .collect();

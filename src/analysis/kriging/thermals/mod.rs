@@ -21,10 +21,10 @@ use super::covariance::{Covariance, Form};
 use super::data::{Drone, Row, Rows, UNIFORM};
 use super::neighbours::{Neighbours, Reach, before};
 use super::scales::{
-    COARSE, Extent, FINE, Family, Found, LN_GUST, LN_LENGTH, LN_SD, LN_SLOW, LN_TIME, Point,
-    Search, Whole, log_prior,
+    COARSE, ENOUGH, Extent, FINE, Family, Found, LN_GUST, LN_LENGTH, LN_SD, LN_SLOW, LN_TIME,
+    Point, Search, Whole, log_prior,
 };
-use crate::numeric::{differences, extent, minimise};
+use crate::numeric::{Least, differences_at_once, extent, minimise_roughly};
 use fit::{Candidate, Fit, PEAK, Region, record};
 use shape::{DRIFT, DRIFT_MPS, PLACE, PLACE_M, SINK, Shape};
 use whiten::Whitening;
@@ -199,8 +199,8 @@ impl Looked<'_> {
         // With the zero better known.
         let mut scales = self.again(self.search.rows, scales, FINE).0;
         while found.len() < MOST {
-            let Some(none) = self.evidence(&left, &scales) else { break };
             let Some(one) = self.one(&left, region, scales) else { break };
+            let Some(none) = self.evidence(&left, &scales) else { break };
             let odds = one.evidence - none;
             let by_all = Whitening::is_of_all(&left);
             if odds < if by_all { WORTH } else { WORTH_BY_NEIGHBOURS } || !one.stands_out() {
@@ -240,8 +240,14 @@ impl Looked<'_> {
             point
         };
         let loss = |some: &[f64; 4]| -search.log_posterior(family, &of(some));
+        let losses = |places: &[[f64; 4]; 4]| {
+            let values: Vec<f64> = places.par_iter().map(loss).collect();
+            std::array::from_fn(|index| values[index])
+        };
+        let slopes = |at: &[f64; 4], value| differences_at_once(losses, at, value);
         let first = AGAIN.map(|index| start[index]);
-        let (best, least) = minimise(first, loss, |at, value| differences(loss, at, value));
+        let Least { at: best, value: least, .. } =
+            minimise_roughly(first, None, ENOUGH, loss, slopes);
         ((family, if least.is_finite() { of(&best) } else { start }), -least)
     }
 
@@ -265,16 +271,21 @@ impl Looked<'_> {
             let values = whitening.white(&values(rows));
             Fit { rows, region, whitening: &whitening, values }.best()
         };
-        let first = look(&scales);
         let mut quiet = scales;
         quiet.1[LN_SD] += QUIET;
         let second = look(&quiet)?;
         if second.log_odds < WORTH_A_LOOK {
             return None;
         }
-        let starts = first.into_iter().chain([second]).filter(|start| is_told(rows, start));
-        starts
+        let first = look(&scales);
+        let starts: Vec<Candidate> =
+            first.into_iter().chain([second]).filter(|start| is_told(rows, start)).collect();
+        let refined: Vec<Explained> = starts
+            .into_par_iter()
             .filter_map(|start| self.refined(rows, region, start, scales))
+            .collect();
+        refined
+            .into_iter()
             .filter(|one| is_told(rows, &one.candidate))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }

@@ -2,11 +2,13 @@
 //! record at once, each value of a longer one by its neighbours.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 
 use crate::analysis::kriging::covariance::Covariance;
 use crate::analysis::kriging::data::{COMMON, Rows};
 use crate::analysis::kriging::dense::factor;
 use crate::analysis::kriging::neighbours::Neighbours;
+use crate::analysis::kriging::pairs::Pairs;
 use crate::analysis::kriging::vecchia::{Common, LEAST_OWN_MPS, Weights, weights};
 
 /// Records of more values than this are made white by neighbours. Numerical: the time grows with the third power, and a
@@ -17,17 +19,20 @@ const MOST_AT_ONCE: usize = 800;
 enum Uncorrelated<'a> {
     /// The factor of the covariance of all values.
     All(DMatrix<f64>),
-    /// The weights of each value's neighbours.
-    Neighbours(&'a Neighbours, Vec<Weights>),
+    /// The weights of each value's neighbours, and by pattern one over the standard deviation that they leave.
+    Neighbours(&'a Neighbours, Vec<Weights>, Vec<f64>),
 }
 
 impl<'a> Uncorrelated<'a> {
     fn new(rows: &Rows, neighbours: &'a Neighbours, covariance: &Covariance) -> Option<Self> {
         if !Whitening::is_of_all(rows) {
-            let each = neighbours.patterns.iter();
+            let pairs = Pairs::of(covariance, rows);
+            let each = neighbours.patterns.par_iter();
             let weights: Option<Vec<Weights>> =
-                each.map(|pattern| weights(pattern, covariance, true)).collect();
-            return Some(Self::Neighbours(neighbours, weights?));
+                each.map(|pattern| weights(pattern, &pairs, true)).collect();
+            let weights = weights?;
+            let inverse = weights.iter().map(|weights| 1.0 / weights.variance.sqrt()).collect();
+            return Some(Self::Neighbours(neighbours, weights, inverse));
         }
         factor(&rows.list, covariance).map(Self::All)
     }
@@ -36,9 +41,9 @@ impl<'a> Uncorrelated<'a> {
     fn ln_sd(&self) -> f64 {
         match self {
             Self::All(factor) => factor.diagonal().iter().map(|sd| sd.ln()).sum(),
-            Self::Neighbours(neighbours, weights) => {
-                let variance = |pattern: &usize| weights[*pattern].variance;
-                neighbours.of.iter().map(|pattern| 0.5 * variance(pattern).ln()).sum()
+            Self::Neighbours(neighbours, weights, _) => {
+                let ln_sd: Vec<f64> = weights.iter().map(|one| 0.5 * one.variance.ln()).collect();
+                neighbours.of.iter().map(|pattern| ln_sd[*pattern]).sum()
             }
         }
     }
@@ -50,14 +55,23 @@ impl<'a> Uncorrelated<'a> {
                 factor.solve_lower_triangular_mut(&mut raw);
                 raw
             }
-            Self::Neighbours(neighbours, weights) => {
-                DMatrix::from_fn(raw.nrows(), raw.ncols(), |index, column| {
-                    let Weights { of, variance } = &weights[neighbours.of[index]];
-                    let near = of.iter().zip(&neighbours.rows[index]);
-                    let expected: f64 =
-                        near.map(|(weight, near)| weight * raw[(*near as usize, column)]).sum();
-                    (raw[(index, column)] - expected) / variance.sqrt()
-                })
+            Self::Neighbours(neighbours, weights, inverse) => {
+                let mut white = DMatrix::zeros(raw.nrows(), raw.ncols());
+                let record = raw.nrows().max(1);
+                for (raw, white) in raw
+                    .as_slice()
+                    .chunks_exact(record)
+                    .zip(white.as_mut_slice().chunks_exact_mut(record))
+                {
+                    for (index, white) in white.iter_mut().enumerate() {
+                        let pattern = neighbours.of[index];
+                        let near = weights[pattern].of.iter().zip(&neighbours.rows[index]);
+                        let expected: f64 =
+                            near.map(|(weight, near)| weight * raw[*near as usize]).sum();
+                        *white = (raw[index] - expected) * inverse[pattern];
+                    }
+                }
+                white
             }
         }
     }
