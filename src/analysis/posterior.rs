@@ -85,8 +85,9 @@ pub(super) fn add(
             .with_constants(&aware.constants_us()),
         wind_mps: wind.and_then(|wind| wind_mps(wind, shared)),
     };
-    let (found, limit) =
-        rayon::join(|| posterior(&input), || known_air(shared).and_then(|air| best(&input, &air)));
+    let is_checked = map.drones.iter().any(|drone| drone.truth_mps.is_some());
+    let at_best = || known_air(shared).filter(|_| is_checked).and_then(|air| best(&input, &air));
+    let (found, limit) = rayon::join(|| posterior(&input), at_best);
     let Some(found) = found else { return };
     let places = indices.clone();
     for (index, series) in indices.into_iter().zip(found.drones) {

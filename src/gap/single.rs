@@ -52,6 +52,7 @@ pub(super) fn review(found: &mut Found) -> Result<(), GapError> {
     beside_what_the_air_may_be(&mut found.steps);
     beside_what_is_left(&mut found.steps, &found.rest);
     beside_inflow_and_drag_of_the_body(found);
+    beside_a_class(&mut found.steps);
     what_another_finding_may_be(&mut found.steps);
     Ok(())
 }
@@ -255,6 +256,26 @@ fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
     }
 }
 
+/// Names of what was found after a class, and depends on the same: which effect the class is decides what form of it was taken
+/// away, and so what is left.
+fn beside_a_class(steps: &mut [Step]) {
+    let firsts: Vec<(usize, String)> = steps
+        .iter()
+        .enumerate()
+        .filter_map(|(place, step)| match &step.finding {
+            Finding::Class { effects, .. } => Some((place, effects.first()?.clone())),
+            Finding::Name { .. } | Finding::Unknown { .. } => None,
+        })
+        .collect();
+    for (place, step) in steps.iter_mut().enumerate() {
+        let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
+        let before = firsts.iter().find(|(of, first)| {
+            *of < place && *first != effect && depend_on_the_same(first, &effect)
+        });
+        doubt(step, before.map(|(_, first)| first.clone()));
+    }
+}
+
 /// Names of what another finding is in doubt to be: one effect does not explain two things, and what the other one is decides
 /// how much of this is left.
 fn what_another_finding_may_be(steps: &mut [Step]) {
@@ -268,8 +289,8 @@ fn what_another_finding_may_be(steps: &mut [Step]) {
     for step in steps {
         let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
         let class = classes.iter().find(|effects| effects.contains(&effect));
-        let other = class.and_then(|effects| effects.iter().find(|other| **other != effect));
-        doubt(step, other.cloned());
+        let others = class.into_iter().flatten().filter(|other| **other != effect);
+        doubt(step, others.cloned());
     }
 }
 
@@ -316,6 +337,11 @@ mod tests {
 
     fn unknown(depends_on: Dependence) -> Finding {
         Finding::Unknown { depends_on, formula: None }
+    }
+
+    fn class(effects: &[&str]) -> Finding {
+        let effects = effects.iter().map(|one| (*one).to_owned()).collect();
+        Finding::Class { effects, parameters: Vec::new() }
     }
 
     fn told(steps: &[Step]) -> Vec<String> {
@@ -400,11 +426,24 @@ mod tests {
     }
 
     #[test]
-    fn what_another_finding_may_be_is_not_named_alone() {
-        let class = |effects: &[&str]| Finding::Class {
-            effects: effects.iter().map(|one| (*one).to_owned()).collect(),
-            parameters: Vec::new(),
+    fn what_was_found_after_a_class_of_its_kind_is_not_named_alone() {
+        let after = |effect: &str| {
+            let drags = step(class(&["face-drag", "momentum-drag"]), 129.0, 20.0, &[]);
+            let mut steps = vec![drags, step(name(effect), 26.0, 12.0, &[])];
+            beside_a_class(&mut steps);
+            told(&steps).remove(1)
         };
+        assert_eq!(after("translational-lift"), "translational-lift face-drag");
+        assert_eq!(after("face-drag"), "face-drag", "found again with another size");
+        assert_eq!(after("motor-thermal"), "motor-thermal", "it depends on something else");
+        let drags = step(class(&["face-drag", "momentum-drag"]), 26.0, 12.0, &[]);
+        let mut steps = vec![step(name("translational-lift"), 129.0, 20.0, &[]), drags];
+        beside_a_class(&mut steps);
+        assert_eq!(told(&steps)[0], "translational-lift", "found before");
+    }
+
+    #[test]
+    fn what_another_finding_may_be_is_not_named_alone() {
         let of = |effects: &[&str]| {
             let inflow = step(name("rotor-inflow"), 129.0, 20.0, &[]);
             let mut steps = vec![inflow, step(class(effects), 26.0, 12.0, &[])];
@@ -413,6 +452,8 @@ mod tests {
         };
         let both = ["rotor-inflow response-drift", "response-drift rotor-inflow"];
         assert_eq!(of(&["response-drift", "rotor-inflow"]), both);
+        let three = of(&["response-drift", "rotor-inflow", "climb"]);
+        assert_eq!(three[0], "rotor-inflow response-drift climb");
         assert_eq!(of(&["response-drift", "climb"])[0], "rotor-inflow");
     }
 

@@ -41,7 +41,7 @@ pub(crate) struct Least<const N: usize, T> {
 }
 
 /// As [`minimise_known`], to where two steps gain less than `enough` each, without a look at whether they do so because the
-/// curvature that was learned on the way is wrong there. For a place to begin at.
+/// curvature that was learned on the way is wrong there. For a place to begin at, or where so much is enough.
 pub(crate) fn minimise_roughly<const N: usize>(
     start: [f64; N],
     alike: Option<&Inverse<N>>,

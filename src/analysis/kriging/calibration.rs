@@ -36,6 +36,7 @@ const OWN_WHITE_US: f64 = 1.0;
 const MISFIT_MPS: f64 = 0.075;
 /// Climb speeds that differ by this differ in it, m/s.
 const MISFIT_CLIMB_MPS: f64 = 1.0;
+
 /// The law of the fleet in air of one kind.
 #[derive(Clone, Debug)]
 pub(super) struct Component {

@@ -163,6 +163,7 @@ impl Covariance {
         Self { slopes: slope_share * slope_share, ..self }
     }
 
+    /// The air that it is of.
     pub(super) fn air(&self) -> &Air {
         &self.air
     }
@@ -267,7 +268,7 @@ impl Covariance {
         self.air.gust_mps.powi(2) * mean_exponential(apart_s, self.air.gust_s)
     }
 
-    /// A way on the level in lengths of the field along and across its stretch.
+    /// A way on the level in lengths of the field, each direction in its own.
     pub(super) fn in_lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [[a, b], [c, d]] = self.inverse;
         [a * x + b * y, c * x + d * y]

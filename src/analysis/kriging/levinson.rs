@@ -28,8 +28,8 @@ const PRESENT_SHARE: f64 = 0.8;
 /// A record without this share of the values does not stand for it. Chosen.
 const KEPT_SHARE: f64 = 0.5;
 
-/// Fields that are remembered: one, and those that its gradient asks for. Numerical.
-const MOST_KNOWN: usize = 8;
+/// Fields that are remembered: of several searches one each, and those that its gradient asks for. Numerical.
+const MOST_KNOWN: usize = 32;
 
 /// A record without gaps.
 #[derive(Debug)]
@@ -54,22 +54,20 @@ pub(super) struct Blocks {
     known: Known,
 }
 
-/// Correlations of the last fields that were asked for.
+/// Correlations of the last fields that were asked for, with the air of each.
 #[derive(Debug, Default)]
-struct Known(Mutex<VecDeque<(Air, usize, Arc<Vec<f64>>)>>);
+struct Known(Mutex<VecDeque<(Air, Arc<Vec<f64>>)>>);
 
 impl Known {
-    /// Of a field and a number of steps that predict.
-    fn find(&self, air: &Air, order: usize) -> Option<Arc<Vec<f64>>> {
+    fn find(&self, air: &Air) -> Option<Arc<Vec<f64>>> {
         let known = self.0.lock().ok()?;
-        let same = known.iter().find(|(of, steps, _)| of == air && *steps == order);
-        same.map(|(_, _, correlations)| Arc::clone(correlations))
+        known.iter().find(|(of, _)| of == air).map(|(_, correlations)| Arc::clone(correlations))
     }
 
-    fn keep(&self, air: Air, order: usize, correlations: Vec<f64>) -> Arc<Vec<f64>> {
+    fn keep(&self, air: Air, correlations: Vec<f64>) -> Arc<Vec<f64>> {
         let correlations = Arc::new(correlations);
         if let Ok(mut known) = self.0.lock() {
-            known.push_back((air, order, Arc::clone(&correlations)));
+            known.push_back((air, Arc::clone(&correlations)));
             if known.len() > MOST_KNOWN {
                 known.pop_front();
             }
@@ -148,33 +146,33 @@ impl Blocks {
             steady,
             steps: steps.len(),
             step_s: (rows.seconds[1] - rows.seconds[0]) as f64,
-            order,
+            order: order.min(steps.len() - 1),
             known: Known::default(),
         })
     }
 
     /// Correlations of the field over all ways, for no step, one, and so on. Most of the differences of a gradient are by scales
     /// that they do not hang on.
-    fn correlations(&self, covariance: &Covariance, order: usize) -> Arc<Vec<f64>> {
+    fn correlations(&self, covariance: &Covariance) -> Arc<Vec<f64>> {
         let alone = covariance.alone();
-        if let Some(known) = self.known.find(alone.air(), order) {
+        if let Some(known) = self.known.find(alone.air()) {
             return known;
         }
         let by_way: Vec<[f64; 2]> = self.ways_m.iter().map(|way_m| alone.by_way(*way_m)).collect();
-        let mut found = Vec::with_capacity((order + 1) * by_way.len());
-        for lag in 0..=order {
+        let mut found = Vec::with_capacity((self.order + 1) * by_way.len());
+        for lag in 0..=self.order {
             let apart = alone.apart(lag as f64 * self.step_s);
             let each = self.ways_m.iter().zip(&by_way);
             found.extend(each.map(|(way_m, by_way)| apart.field_by(*way_m, *by_way)));
         }
-        self.known.keep(*alone.air(), order, found)
+        self.known.keep(*alone.air(), found)
     }
 
     /// Covariances of all channels with all channels so many steps before, (m/s)²: that of the most steps first.
-    fn lagged(&self, covariance: &Covariance, order: usize) -> DMatrix<f64> {
-        let n = self.drones.len();
+    fn lagged(&self, covariance: &Covariance) -> DMatrix<f64> {
+        let (n, order) = (self.drones.len(), self.order);
         let mut stacked = DMatrix::zeros((order + 1) * n, n);
-        let correlations = self.correlations(covariance, order);
+        let correlations = self.correlations(covariance);
         let variance = covariance.air().sd_mps.powi(2);
         let slow: Vec<f64> = self.ways_m.iter().map(|way_m| covariance.slow(*way_m, 0.0)).collect();
         let mut fields = vec![0.0; self.ways_m.len()];
@@ -207,8 +205,8 @@ impl Blocks {
     /// where rounding leaves no positive definite covariance.
     pub(super) fn system(&self, covariance: &Covariance, own_mps: &[f64]) -> Option<System> {
         let n = self.drones.len();
-        let order = self.order.min(self.steps - 1);
-        let lagged = self.lagged(covariance, order);
+        let order = self.order;
+        let lagged = self.lagged(covariance);
         let mut predictor = Predictor::new(lagged, n, covariance.is_reversible());
         let mut parts = Parts::new(n);
         let mut square = DMatrix::zeros(n, n);
@@ -421,7 +419,6 @@ fn spread(drones: &[usize], most: usize, place_m: impl Fn(&usize) -> [f64; 3]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::corrections::DOUBTS;
     use crate::analysis::kriging::covariance::{Air, Form};
     use crate::analysis::kriging::data::{UNIFORM, Value};
     use crate::analysis::kriging::vecchia::LEAST_OWN_MPS;
@@ -438,7 +435,10 @@ mod tests {
                     Value {
                         updraft_mps: 0.3 + 0.4 * wave + 0.05 * x,
                         law: std::array::from_fn(|column| 0.02 * (column as f64 + wave)),
-                        doubts_mps: [0.01; DOUBTS],
+                        // One that changes, and others that do not.
+                        doubts_mps: std::array::from_fn(|doubt| {
+                            0.01 * if doubt == 1 { wave } else { doubt as f64 + x }
+                        }),
                         own_mps: 0.05,
                         noise_mps: 0.04,
                     }
@@ -454,9 +454,11 @@ mod tests {
             .collect()
     }
 
-    /// The likelihood by all values at once.
-    fn dense(rows: &Rows, covariance: &Covariance, own_mps: f64) -> (f64, f64) {
+    /// The likelihood by all values at once, with common errors of this factor; and the information about an updraft.
+    fn dense(rows: &Rows, covariance: &Covariance, own_mps: f64, errors: &Common) -> (f64, f64) {
         let n = rows.list.len();
+        let common = DMatrix::from_fn(n, COMMON, |row, column| rows.list[row].common[column]);
+        let spread = common * DMatrix::from_column_slice(COMMON, COMMON, errors.as_slice());
         let mut matrix = DMatrix::from_fn(n, n, |row, column| {
             let (one, other) = (&rows.list[row], &rows.list[column]);
             let own = if one.spot.drone == other.spot.drone { own_mps * own_mps } else { 0.0 };
@@ -465,6 +467,7 @@ mod tests {
         for row in 0..n {
             matrix[(row, row)] += rows.list[row].noise_mps.powi(2);
         }
+        matrix += &spread * spread.transpose();
         let factor = matrix.cholesky().unwrap();
         let values = DVector::from_fn(n, |row, _| rows.list[row].value_mps);
         let ones = DVector::from_element(n, 1.0);
@@ -499,13 +502,17 @@ mod tests {
             let blocks = Blocks::of(&drones, &rows, SIZE).unwrap();
             let own_mps = 0.05_f64.max(LEAST_OWN_MPS);
             let system = blocks.system(&covariance, &[own_mps; 6]).unwrap();
-            let (expected, information) = dense(&rows, &covariance, own_mps);
+            let (expected, information) = dense(&rows, &covariance, own_mps, &Common::zeros());
             let found = system.posterior(&CommonVector::zeros(), &Common::zeros()).unwrap();
             assert!(
                 (found.log_likelihood - expected).abs() < 1e-6 * expected.abs(),
                 "{form:?} {drift_mps:?}: {} {expected}",
                 found.log_likelihood
             );
+            let errors = Common::from_diagonal(&CommonVector::from_fn(|row, _| 0.5 + row as f64));
+            let (expected, _) = dense(&rows, &covariance, own_mps, &errors);
+            let found = system.posterior(&CommonVector::zeros(), &errors).unwrap().log_likelihood;
+            assert!((found - expected).abs() < 1e-6 * expected.abs(), "{found} {expected}");
             // An updraft that is everywhere the same, with a prior of 3 m/s.
             let mut factor = Common::zeros();
             factor[(UNIFORM, UNIFORM)] = 3.0;
@@ -514,6 +521,50 @@ mod tests {
             let found = uniform.covariance[(UNIFORM, UNIFORM)];
             assert!((found / variance - 1.0).abs() < 1e-6, "{found} {variance}");
         }
+    }
+
+    #[test]
+    fn a_field_that_is_remembered_is_the_one_that_is_asked_for() {
+        let air = Air {
+            form: Form::Exponential,
+            sd_mps: 0.5,
+            length_m: 60.0,
+            stretch: [0.2, -0.1],
+            time_s: 90.0,
+            drift_mps: [1.5, -0.5],
+            gust_mps: 0.15,
+            gust_s: 5.0,
+            slow_mps: 0.1,
+            shared_mps: 0.03,
+        };
+        let drones = fleet(120);
+        let rows = Rows::of(&drones, 5, 10);
+        let of = |blocks: &Blocks, air: Air| {
+            let system = blocks.system(&Covariance::new(air), &[0.05; 6]).unwrap();
+            let solved = system.posterior(&CommonVector::zeros(), &Common::zeros());
+            solved.unwrap().log_likelihood
+        };
+        let others = [
+            Air { sd_mps: 0.3, ..air },
+            Air { gust_mps: 0.3, ..air },
+            Air { gust_s: 2.0, ..air },
+            Air { slow_mps: 0.3, ..air },
+            Air { shared_mps: 0.1, ..air },
+            Air { form: Form::Gaussian, ..air },
+            Air { length_m: 50.0, ..air },
+            Air { stretch: [0.2, 0.1], ..air },
+            Air { time_s: 80.0, ..air },
+            Air { drift_mps: [1.5, 0.5], ..air },
+        ];
+        let blocks = Blocks::of(&drones, &rows, SIZE).unwrap();
+        let first = of(&blocks, air);
+        for other in others {
+            let alone = of(&Blocks::of(&drones, &rows, SIZE).unwrap(), other);
+            assert_eq!(of(&blocks, other), alone, "{other:?}");
+            assert_ne!(alone, first);
+        }
+        let remembered = blocks.known.0.lock().unwrap().len();
+        assert_eq!(remembered, 6, "the first field and the five that are other fields");
     }
 
     #[test]

@@ -6,84 +6,95 @@ use super::data::Rows;
 
 /// Steps between two values, at most, for which the fall by time is known beforehand: those of all neighbours of one place.
 const MOST_STEPS: i32 = 10;
-/// The same for which all pairs of drones are: those of nearly all neighbours of one place.
+/// The same for which there is a table of all pairs of drones: those of nearly all neighbours of one place.
 const MOST_STEPS_OF_PAIRS: i32 = 3;
-/// More drones have more pairs than their neighbours ask for. Numerical.
+/// Fleets of more drones have no table of pairs: it would have more entries than their neighbours ask for. Numerical.
 const MOST_DRONES: usize = 128;
+/// Entries of all tables of a fleet together, at most: 32 MB.
+const MOST_ENTRIES: usize = 4_000_000;
 
 /// What values so many steps apart have in common.
 struct Step<'a> {
     apart: Apart<'a>,
     besides: Besides,
-    /// Of each drone's value (row) with each other's (column), (m/s)²; none for many steps.
+    /// Of each drone's value (row) with each other's (column), (m/s)²; not a number for drones without a place. Empty where
+    /// there is no table.
     of_drones: Vec<f64>,
+}
+
+/// Which steps are known beforehand.
+struct Span {
+    first: i32,
+    last: i32,
+    /// Steps to either side for which there is a table of pairs.
+    of_pairs: i32,
 }
 
 /// The covariance of values, by what is known of it beforehand where that is known.
 pub(super) struct Pairs<'a> {
     covariance: &'a Covariance,
     step_s: f64,
-    most_steps: f64,
+    /// The first of `steps`.
+    first: f64,
     drones: usize,
-    /// From the most steps back to the most ahead; none for drones that move.
+    /// Empty for drones that do not hover.
     steps: Vec<Step<'a>>,
 }
 
 impl<'a> Pairs<'a> {
-    /// Between the values of rows, and places around them, for all that are neighbours.
+    /// For values and their neighbours, before and after.
     pub(super) fn of(covariance: &'a Covariance, rows: &Rows) -> Self {
-        Self::of_steps(covariance, rows, MOST_STEPS, MOST_STEPS_OF_PAIRS)
+        let span = Span { first: -MOST_STEPS, last: MOST_STEPS, of_pairs: MOST_STEPS_OF_PAIRS };
+        Self::over(covariance, rows, &span)
     }
 
-    /// The same for all values.
+    /// For each value and all that are not later.
     pub(super) fn of_all(covariance: &'a Covariance, rows: &Rows) -> Self {
-        let most = rows.seconds.len() as i32;
-        Self::of_steps(covariance, rows, most, most)
+        let last = rows.seconds.len() as i32;
+        Self::over(covariance, rows, &Span { first: 0, last, of_pairs: last })
     }
 
-    fn of_steps(covariance: &'a Covariance, rows: &Rows, most: i32, most_of_pairs: i32) -> Self {
-        let mut places_m = vec![None; rows.place.len()];
-        for row in &rows.list {
-            if let Some(place_m) = row.spot.drone.and_then(|drone| places_m.get_mut(drone)) {
-                *place_m = Some(row.spot.place_m);
-            }
-        }
-        let stands = |row: &super::data::Row| row.spot.velocity_mps == [0.0; 3];
+    fn over(covariance: &'a Covariance, rows: &Rows, span: &Span) -> Self {
         let step_s = match rows.seconds[..] {
             [first, second, ..] => (second - first) as f64,
             _ => 0.0,
         };
-        let is_known = step_s > 0.0 && rows.list.iter().all(stands);
-        let steps = if is_known { -most..=most } else { 1..=0 };
+        let places_m = places(rows).filter(|_| step_s > 0.0);
+        let known = places_m.as_ref().map_or(1..=0, |_| span.first..=span.last);
+        let places_m = places_m.unwrap_or_default();
+        let tables = known.clone().filter(|step| step.abs() <= span.of_pairs).count();
+        let is_small = places_m.len() <= MOST_DRONES
+            && tables * places_m.len() * places_m.len() <= MOST_ENTRIES;
         let of_step = |step: i32| {
             let apart_s = f64::from(step) * step_s;
             let (apart, besides) = (covariance.apart(apart_s), covariance.besides(apart_s));
-            let is_asked = step.abs() <= most_of_pairs && places_m.len() <= MOST_DRONES;
-            let of_drones = if is_asked { all(&places_m, &apart, &besides) } else { Vec::new() };
+            let has_table = is_small && step.abs() <= span.of_pairs;
+            let of_drones = if has_table { table(&places_m, &apart, &besides) } else { Vec::new() };
             Step { apart, besides, of_drones }
         };
-        let steps = steps.map(of_step).collect();
-        Self { covariance, step_s, most_steps: f64::from(most), drones: places_m.len(), steps }
+        let steps = known.map(of_step).collect();
+        let (first, drones) = (f64::from(span.first), places_m.len());
+        Self { covariance, step_s, first, drones, steps }
     }
 
-    /// Of values so many seconds apart; `None` if that is no step.
-    fn step(&self, apart_s: f64) -> Option<&Step<'a>> {
-        let steps = apart_s / self.step_s + self.most_steps;
-        let index = steps as usize;
+    /// What is known of two spots beforehand; `None` if one of them moves, or if their times are no known step apart.
+    fn step(&self, one: &Spot, other: &Spot) -> Option<&Step<'a>> {
+        let stand = [one, other].iter().all(|spot| spot.velocity_mps == [0.0; 3]);
+        let place = (one.time_s - other.time_s) / self.step_s - self.first;
+        let index = place as usize;
         // What is negative, or no number, has no place.
-        if index as f64 == steps { self.steps.get(index) } else { None }
+        self.steps.get(index).filter(|_| stand && index as f64 == place)
     }
 
     /// As [`Covariance::of`].
     pub(super) fn of_values(&self, one: &Spot, other: &Spot) -> f64 {
-        let Some(step) = self.step(one.time_s - other.time_s) else {
-            return self.covariance.of(one, other);
-        };
+        let Some(step) = self.step(one, other) else { return self.covariance.of(one, other) };
         let known = one.drone.zip(other.drone).and_then(|(one, other)| {
-            let is_one = one < self.drones && other < self.drones;
-            step.of_drones.get(one * self.drones + other).filter(|_| is_one)
+            let is_drone = one < self.drones && other < self.drones;
+            let known = step.of_drones.get(one * self.drones + other);
+            known.copied().filter(|value| is_drone && !value.is_nan())
         });
-        known.copied().unwrap_or_else(|| {
+        known.unwrap_or_else(|| {
             let is_own = one.drone.is_some() && one.drone == other.drone;
             step.besides.with(step.apart.field(way_m(one.place_m, other.place_m)), is_own)
         })
@@ -91,23 +102,33 @@ impl<'a> Pairs<'a> {
 
     /// As [`Covariance::with_air`].
     pub(super) fn with_air(&self, air: &Spot, shown: &Spot) -> f64 {
-        match self.step(air.time_s - shown.time_s) {
-            Some(step) => {
-                let field = step.apart.field(way_m(air.place_m, shown.place_m));
-                let is_own = air.drone.is_some() && air.drone == shown.drone;
-                if is_own { field + step.besides.gusts() } else { field }
-            }
-            None => self.covariance.with_air(air, shown),
+        let Some(step) = self.step(air, shown) else { return self.covariance.with_air(air, shown) };
+        let field = step.apart.field(way_m(air.place_m, shown.place_m));
+        let is_own = air.drone.is_some() && air.drone == shown.drone;
+        if is_own { field + step.besides.gusts() } else { field }
+    }
+}
+
+/// Where each drone stands, m; `None` for a drone without rows. Nothing if one of them moves, or stands at two places.
+fn places(rows: &Rows) -> Option<Vec<Option<[f64; 3]>>> {
+    let mut places_m = vec![None; rows.place.len()];
+    for row in &rows.list {
+        let spot = &row.spot;
+        let known = places_m.get_mut(spot.drone?)?;
+        let stays = *known.get_or_insert(spot.place_m) == spot.place_m;
+        if !stays || spot.velocity_mps != [0.0; 3] {
+            return None;
         }
     }
+    Some(places_m)
 }
 
 fn way_m(to_m: [f64; 3], from_m: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| to_m[axis] - from_m[axis])
 }
 
-/// Of each drone with each other; drones without a place have none that anybody asks for.
-fn all(places_m: &[Option<[f64; 3]>], apart: &Apart<'_>, besides: &Besides) -> Vec<f64> {
+/// Of each drone with each other.
+fn table(places_m: &[Option<[f64; 3]>], apart: &Apart<'_>, besides: &Besides) -> Vec<f64> {
     let mut found = Vec::with_capacity(places_m.len() * places_m.len());
     for (one, to_m) in places_m.iter().enumerate() {
         for (other, from_m) in places_m.iter().enumerate() {
@@ -136,6 +157,11 @@ mod tests {
         Drone { place_m, values: vec![Some(value); 160], ..Drone::default() }
     }
 
+    /// 0 before second 75, 1 from second 85 on.
+    fn step_at(second: u32) -> f64 {
+        (f64::from(second) / 10.0 - 7.5).clamp(0.0, 1.0)
+    }
+
     #[test]
     fn what_is_known_beforehand_is_the_covariance_bit_for_bit() {
         let hover = |index: i32| {
@@ -143,7 +169,16 @@ mod tests {
         };
         let hovers: Vec<Drone> = (0..6).map(hover).collect();
         let goes = |y: f64| drone((0..160).map(|second| [f64::from(second), y, 40.0]).collect());
-        for drones in [hovers, vec![goes(0.0), goes(10.0)]] {
+        // Hovers, flies 8 m without values, and hovers again.
+        let mut stops = drone((0..160).map(|second| [8.0 * step_at(second), 0.0, 40.0]).collect());
+        stops.values[70..90].fill(None);
+        let gone = Drone { values: vec![None; 160], ..drone(vec![[9.0, 9.0, 40.0]]) };
+        let mut with_a_gap = hovers.clone();
+        with_a_gap.insert(2, gone);
+        let many: Vec<Drone> = (0..130).map(hover).collect();
+        for drones in
+            [hovers, with_a_gap, many, vec![goes(0.0), goes(10.0)], vec![goes(5.0), stops]]
+        {
             let rows = Rows::of(&drones, 4, 10);
             let beside = Spot { place_m: [3.0, 4.0, 41.0], drone: None, ..rows.list[0].spot };
             let between = Spot { time_s: beside.time_s + 5.0, ..beside };
@@ -163,7 +198,10 @@ mod tests {
                     })
                     .shown(0.1);
                     let known = [Pairs::of(&covariance, &rows), Pairs::of_all(&covariance, &rows)];
-                    let spots = || rows.list.iter().map(|row| row.spot).chain([beside, between]);
+                    // Of many drones, some.
+                    let every = 1 + rows.list.len() / 200;
+                    let some = || rows.list.iter().step_by(every);
+                    let spots = || some().map(|row| row.spot).chain([beside, between]);
                     for one in spots() {
                         for other in spots() {
                             for pairs in &known {

@@ -106,7 +106,7 @@ pub(super) struct Extent {
 /// which know a length to 15 %.
 pub(super) const FINE: Extent =
     Extent { blocks: Size { drones: 16, operations: 12e6 }, values: 300 };
-/// What the search begins with.
+/// What the search begins with: of a hover 9 drones, and the 160 s before a value.
 pub(super) const COARSE: Extent =
     Extent { blocks: Size { drones: 9, operations: 6e5 }, values: 100 };
 
@@ -289,8 +289,8 @@ impl Search<'_> {
         std::array::from_fn(|index| if slopes[index].is_finite() { slopes[index] } else { 0.0 })
     }
 
-    /// The most probable scales from a start, by some of the values where that is enough to begin with; a search for those of a
-    /// field that falls otherwise knows the curvature.
+    /// The most probable scales from a start, by some of the values where that is enough to begin with, and with the curvature
+    /// that the search for those of another form has learned, if there is one.
     fn climb(&self, family: Family, start: Point, alike: Option<&Top>) -> Top {
         let some = Search { whole: self.coarse.or(self.whole), ..*self };
         let loss = |point: &Point| -some.log_posterior(family, point);

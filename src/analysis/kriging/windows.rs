@@ -62,7 +62,8 @@ impl StandIns {
         Self { pairs_m, count: count.max(1) as f64, drones }
     }
 
-    /// Sums with one drone itself, and over all pairs both ways, as the average over drones has it and as one drone's deviation.
+    /// By the covariance of one drone with itself, and the sum over all pairs both ways: that of the average over drones, and of
+    /// one drone's own deviation from it.
     fn split(&self, [own, over]: [f64; 2]) -> [f64; 2] {
         if self.pairs_m.is_empty() {
             return [own, 0.0];
@@ -75,6 +76,7 @@ impl StandIns {
 /// Two windows, with all that does not hang on the air.
 #[derive(Clone, Debug)]
 struct Two {
+    /// Row and column of the matrices.
     at: (usize, usize),
     apart_s: f64,
     /// How much higher and later each node of one is than each of the other, m and s.
@@ -91,6 +93,7 @@ pub(super) struct Met {
 }
 
 impl Met {
+    /// Of the cells of a calibration.
     pub(super) fn of(cells: &[CellAt], stand_ins: &StandIns, taller: f64) -> Self {
         let mut all = Vec::new();
         for (row, one) in cells.iter().enumerate() {
@@ -144,4 +147,83 @@ fn two(
     let pairs = stand_ins.pairs_m.iter().map(|[x_m, y_m]| 2.0 * over(*x_m, *y_m)).sum();
     let slow = stand_ins.split([over(0.0, 0.0), pairs]);
     Two { at: (row, column), apart_s: one.time_s - other.time_s, nodes, slow }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::kriging::covariance::{Air, Form};
+
+    fn cell(time_s: f64, height_m: f64, climb_mps: f64) -> CellAt {
+        CellAt { time_s, span_s: 9.0, height_m, climb_mps, drones: 4 }
+    }
+
+    /// The average over drones, and one drone's part of it, by summing over all drones.
+    fn summed(
+        covariance: &Covariance,
+        homes_m: &[[f64; 2]],
+        (one, other): (&CellAt, &CellAt),
+        taller: f64,
+    ) -> [f64; 2] {
+        let over = |[x_m, y_m]: [f64; 2]| {
+            let mut sum = 0.0;
+            for at in NODES {
+                for other_at in NODES {
+                    let ((time_s, height_m), (other_s, other_m)) = (one.at(at), other.at(other_at));
+                    let way_m = [x_m, y_m, (height_m - other_m) / taller];
+                    sum += WEIGHT * covariance.instant(way_m, time_s - other_s);
+                }
+            }
+            sum
+        };
+        let own = over([0.0; 2]);
+        let mut all = 0.0;
+        for from_m in homes_m {
+            for to_m in homes_m {
+                all += over([to_m[0] - from_m[0], to_m[1] - from_m[1]]);
+            }
+        }
+        let shared = if homes_m.is_empty() { own } else { all / (homes_m.len() as f64).powi(2) };
+        [shared, own - shared]
+    }
+
+    #[test]
+    fn windows_share_what_the_averages_over_drones_share() {
+        let cells = [cell(0.0, 20.0, 0.0), cell(15.0, 27.0, 1.5), cell(70.0, 60.0, -2.0)];
+        let homes_m = [[0.0, 0.0], [12.0, 0.0], [3.0, 14.0], [30.0, 25.0]];
+        for drift_mps in [[0.0; 2], [1.0, -2.0]] {
+            let covariance = Covariance::new(Air {
+                form: Form::Exponential,
+                sd_mps: 0.5,
+                length_m: 40.0,
+                stretch: [0.2, 0.1],
+                time_s: 60.0,
+                drift_mps,
+                gust_mps: 0.3,
+                gust_s: 6.0,
+                slow_mps: 0.3,
+                shared_mps: 0.1,
+            });
+            for drones in [0, 1, 2, 4] {
+                let homes_m = &homes_m[..drones];
+                let stand_ins = StandIns::of(homes_m, 4.0);
+                for taller in [1.0, 4.0] {
+                    let met = Met::of(&cells, &stand_ins, taller);
+                    let found = met.between(&covariance, &stand_ins);
+                    for (row, one) in cells.iter().enumerate() {
+                        for (column, other) in cells.iter().enumerate() {
+                            let [shared, own] = summed(&covariance, homes_m, (one, other), taller);
+                            let gusts = covariance.gusts(one.time_s - other.time_s);
+                            let of_all = if drones < 2 { gusts } else { gusts / 4.0 };
+                            let at = (row, column);
+                            let close = |found: f64, is: f64| (found - is).abs() < 1e-12;
+                            assert!(close(found.shared[at], shared + of_all), "{drones} {at:?}");
+                            assert!(close(found.by_field[at], own), "{drones} {at:?}");
+                            assert!(close(found.by_gusts[at], gusts - of_all), "{drones} {at:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
