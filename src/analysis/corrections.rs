@@ -308,7 +308,7 @@ mod tests {
             for (density, unit) in [(None, None), (Some(density), None), (Some(density), Some(2.5))]
             {
                 let corrections =
-                    Corrections { leaning, lean_table, density, unit, ..Corrections::default() };
+                    Corrections { density, leaning, lean_table, unit, ..Corrections::default() };
                 let referred = corrections.refer(&raw, None, SLOPE);
                 assert_eq!(corrections.pulse(&raw, None), referred.pulse_us);
             }

@@ -60,9 +60,9 @@ impl<'a> Pairs<'a> {
             _ => 0.0,
         };
         let places_m = places(rows).filter(|_| step_s > 0.0);
-        let known = places_m.as_ref().map_or(1..=0, |_| span.first..=span.last);
+        let known: Vec<i32> = places_m.iter().flat_map(|_| span.first..=span.last).collect();
         let places_m = places_m.unwrap_or_default();
-        let tables = known.clone().filter(|step| step.abs() <= span.of_pairs).count();
+        let tables = known.iter().filter(|step| step.abs() <= span.of_pairs).count();
         let is_small = places_m.len() <= MOST_DRONES
             && tables * places_m.len() * places_m.len() <= MOST_ENTRIES;
         let of_step = |step: i32| {
@@ -72,7 +72,7 @@ impl<'a> Pairs<'a> {
             let of_drones = if has_table { table(&places_m, &apart, &besides) } else { Vec::new() };
             Step { apart, besides, of_drones }
         };
-        let steps = known.map(of_step).collect();
+        let steps = known.into_iter().map(of_step).collect();
         let (first, drones) = (f64::from(span.first), places_m.len());
         Self { covariance, step_s, first, drones, steps }
     }

@@ -89,7 +89,7 @@ const MOST_REACH: f64 = 3.0;
 #[derive(Debug)]
 pub(super) enum Whole {
     /// Of drones that stand still, at equal steps of time.
-    Blocks(Blocks),
+    Blocks(Box<Blocks>),
     /// Of any drones.
     Dense(Dense),
 }
@@ -114,7 +114,7 @@ impl Whole {
     /// Of a record of these drones.
     pub(super) fn of(drones: &[Drone], rows: &Rows, extent: Extent) -> Self {
         match Blocks::of(drones, rows, extent.blocks) {
-            Some(blocks) => Self::Blocks(blocks),
+            Some(blocks) => Self::Blocks(Box::new(blocks)),
             None => Self::Dense(Dense::of(rows, extent.values)),
         }
     }

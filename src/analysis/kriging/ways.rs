@@ -14,7 +14,7 @@ pub(super) struct Ways {
     /// How fast the field drifts, lengths of the field per second.
     drift: [f64; 2],
     /// The ways, lengths of the field.
-    ways: Vec<[f64; 2]>,
+    each: Vec<[f64; 2]>,
 }
 
 impl Ways {
@@ -27,7 +27,7 @@ impl Ways {
             time_s: air.time_s,
             length_m: air.length_m,
             drift: covariance.in_lengths(air.drift_mps),
-            ways: ways_m.iter().map(|way_m| covariance.in_lengths(*way_m)).collect(),
+            each: ways_m.iter().map(|way_m| covariance.in_lengths(*way_m)).collect(),
         }
     }
 
@@ -45,12 +45,12 @@ impl Ways {
         };
         let [x, y] = self.drift.map(|drift| drift * apart_s);
         let over = if self.drift == [0.0; 2] {
-            2.0 * self.ways.iter().map(|way| along(*way)).sum::<f64>()
+            2.0 * self.each.iter().map(|way| along(*way)).sum::<f64>()
         } else {
             let both = |way: &[f64; 2]| {
                 along([way[0] - x, way[1] - y]) + along([-way[0] - x, -way[1] - y])
             };
-            self.ways.iter().map(both).sum()
+            self.each.iter().map(both).sum()
         };
         [along([x, y]), over]
     }
