@@ -176,8 +176,7 @@ mod tests {
         let mut with_a_gap = hovers.clone();
         with_a_gap.insert(2, gone);
         let many: Vec<Drone> = (0..130).map(hover).collect();
-        for drones in
-            [hovers, with_a_gap, many, vec![goes(0.0), goes(10.0)], vec![goes(5.0), stops]]
+        for drones in [hovers, with_a_gap, many, vec![goes(0.0), goes(10.0)], vec![hover(1), stops]]
         {
             let rows = Rows::of(&drones, 4, 10);
             let beside = Spot { place_m: [3.0, 4.0, 41.0], drone: None, ..rows.list[0].spot };
