@@ -117,6 +117,15 @@ fn lone_name(step: &Step) -> Option<&str> {
     }
 }
 
+/// The effects of each class, with its place among the steps.
+fn classes(steps: &[Step]) -> Vec<(usize, Vec<String>)> {
+    let of = |(place, step): (usize, &Step)| match &step.finding {
+        Finding::Class { effects, .. } => Some((place, effects.clone())),
+        Finding::Name { .. } | Finding::Unknown { .. } => None,
+    };
+    steps.iter().enumerate().filter_map(of).collect()
+}
+
 /// Makes a class of a name and others, if there are any.
 fn doubt(step: &mut Step, others: impl IntoIterator<Item = String>) {
     let Finding::Name { effect, parameters, .. } = &step.finding else { return };
@@ -259,36 +268,23 @@ fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
 /// Names of what was found after a class, and depends on the same: which effect the class is decides what form of it was taken
 /// away, and so what is left.
 fn beside_a_class(steps: &mut [Step]) {
-    let firsts: Vec<(usize, String)> = steps
-        .iter()
-        .enumerate()
-        .filter_map(|(place, step)| match &step.finding {
-            Finding::Class { effects, .. } => Some((place, effects.first()?.clone())),
-            Finding::Name { .. } | Finding::Unknown { .. } => None,
-        })
-        .collect();
+    let classes = classes(steps);
     for (place, step) in steps.iter_mut().enumerate() {
         let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
-        let before = firsts.iter().find(|(of, first)| {
-            *of < place && *first != effect && depend_on_the_same(first, &effect)
-        });
-        doubt(step, before.map(|(_, first)| first.clone()));
+        let before = classes.iter().filter(|(of, _)| *of < place);
+        let mut firsts = before.filter_map(|(_, effects)| effects.first());
+        let first = firsts.find(|first| **first != effect && depend_on_the_same(first, &effect));
+        doubt(step, first.cloned());
     }
 }
 
 /// Names of what another finding is in doubt to be: one effect does not explain two things, and what the other one is decides
 /// how much of this is left.
 fn what_another_finding_may_be(steps: &mut [Step]) {
-    let classes: Vec<Vec<String>> = steps
-        .iter()
-        .filter_map(|step| match &step.finding {
-            Finding::Class { effects, .. } => Some(effects.clone()),
-            Finding::Name { .. } | Finding::Unknown { .. } => None,
-        })
-        .collect();
+    let classes = classes(steps);
     for step in steps {
         let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
-        let class = classes.iter().find(|effects| effects.contains(&effect));
+        let class = classes.iter().map(|(_, effects)| effects).find(|one| one.contains(&effect));
         let others = class.into_iter().flatten().filter(|other| **other != effect);
         doubt(step, others.cloned());
     }

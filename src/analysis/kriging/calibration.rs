@@ -51,12 +51,6 @@ pub(super) struct Component {
 }
 
 impl CellAt {
-    /// Time and height at a share of the window's length from its middle on.
-    pub(super) fn at(&self, share: f64) -> (f64, f64) {
-        let by_s = share * self.span_s;
-        (self.time_s + by_s, self.height_m + by_s * self.climb_mps)
-    }
-
     /// Covariance of how far two windows are from the fleet's law by how fast they climb, (m/s)²; none in hover, since the zero
     /// is what the law has there.
     fn misfit(&self, other: &Self) -> f64 {

@@ -353,10 +353,10 @@ fn mean_exponential(apart_s: f64, tau_s: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn air(form: Form) -> Air {
+    pub(in crate::analysis::kriging) fn air(form: Form) -> Air {
         Air {
             form,
             sd_mps: 0.5,

@@ -143,6 +143,7 @@ fn table(places_m: &[Option<[f64; 3]>], apart: &Apart<'_>, besides: &Besides) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::kriging::covariance::tests::air;
     use crate::analysis::kriging::covariance::{Air, Form};
     use crate::analysis::kriging::data::{Drone, Value};
 
@@ -184,16 +185,11 @@ mod tests {
             for form in Form::ALL {
                 for drift_mps in [[0.0; 2], [2.0, -1.0]] {
                     let covariance = Covariance::new(Air {
-                        form,
-                        sd_mps: 0.5,
-                        length_m: 60.0,
                         stretch: [0.2, 0.1],
-                        time_s: 80.0,
                         drift_mps,
-                        gust_mps: 0.3,
-                        gust_s: 6.0,
                         slow_mps: 0.2,
                         shared_mps: 0.1,
+                        ..air(form)
                     })
                     .shown(0.1);
                     let known = [Pairs::of(&covariance, &rows), Pairs::of_all(&covariance, &rows)];

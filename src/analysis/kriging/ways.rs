@@ -60,24 +60,15 @@ impl Ways {
 mod tests {
     use super::*;
     use crate::analysis::kriging::covariance::Air;
+    use crate::analysis::kriging::covariance::tests::air;
 
     #[test]
     fn ways_at_once_have_the_covariance_of_each() {
         let ways_m = [[10.0, 0.0], [-20.0, 30.0], [0.0, 7.0]];
         for form in Form::ALL {
             for drift_mps in [[0.0; 2], [2.0, -1.0]] {
-                let covariance = Covariance::new(Air {
-                    form,
-                    sd_mps: 0.5,
-                    length_m: 60.0,
-                    stretch: [0.2, 0.1],
-                    time_s: 80.0,
-                    drift_mps,
-                    gust_mps: 0.3,
-                    gust_s: 6.0,
-                    slow_mps: 0.0,
-                    shared_mps: 0.1,
-                });
+                let covariance =
+                    Covariance::new(Air { stretch: [0.2, 0.1], drift_mps, ..air(form) });
                 let ways = Ways::of(&covariance, &ways_m);
                 for (up_m, apart_s) in [(0.0, 0.0), (12.0, -30.0), (-3.0, 400.0), (0.0, 9e4)] {
                     let of = |x_m, y_m| covariance.instant_field([x_m, y_m, up_m], apart_s);

@@ -13,6 +13,14 @@ const NODES: [f64; 2] = [-0.288_675_135, 0.288_675_135];
 /// Weight of each pair of them.
 const WEIGHT: f64 = 0.25;
 
+impl CellAt {
+    /// Time and height at a share of the window's length from its middle on.
+    fn at(&self, share: f64) -> (f64, f64) {
+        let by_s = share * self.span_s;
+        (self.time_s + by_s, self.height_m + by_s * self.climb_mps)
+    }
+}
+
 /// Covariances of the air in the windows of a calibration, each with each, (m/s)².
 #[derive(Clone, Debug)]
 pub(super) struct Between {
@@ -152,6 +160,7 @@ fn two(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::kriging::covariance::tests::air;
     use crate::analysis::kriging::covariance::{Air, Form};
 
     fn cell(time_s: f64, height_m: f64, climb_mps: f64) -> CellAt {
@@ -193,16 +202,10 @@ mod tests {
         let homes_m = [[0.0, 0.0], [12.0, 0.0], [3.0, 14.0], [30.0, 25.0]];
         for drift_mps in [[0.0; 2], [1.0, -2.0]] {
             let covariance = Covariance::new(Air {
-                form: Form::Exponential,
-                sd_mps: 0.5,
-                length_m: 40.0,
                 stretch: [0.2, 0.1],
-                time_s: 60.0,
                 drift_mps,
-                gust_mps: 0.3,
-                gust_s: 6.0,
                 slow_mps: 0.3,
-                shared_mps: 0.1,
+                ..air(Form::Exponential)
             });
             for drones in [0, 1, 2, 4] {
                 let homes_m = &homes_m[..drones];
