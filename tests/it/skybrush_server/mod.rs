@@ -35,8 +35,8 @@ fn run(bench: &Bench, server: &Fake, args: &[&str]) -> Ended {
     command.args(["--connect", &format!("skybrush://{}", server.address)]);
     command.args(server.clock.args());
     let ended = Ended::of(&command.stdin(Stdio::null()).output().unwrap());
-    let port = server.address.port().to_string();
-    let tidy = |text: &str| without_time_left(&text.replace(&port, "PORT"));
+    let address = server.address.to_string();
+    let tidy = |text: &str| without_time_left(&text.replace(&address, "127.0.0.1:PORT"));
     Ended { err: tidy(&ended.err), out: tidy(&ended.out), ..ended }
 }
 
