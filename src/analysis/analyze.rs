@@ -46,7 +46,6 @@ use super::turbulence;
 use super::updraft::{self, DroneSeries};
 use super::warning::Warning;
 use super::widened;
-use super::wind_forms::{Belief, WindForms};
 use super::wind_legs;
 use crate::flight::Indicator;
 use crate::mission::plan::{Group, Purpose, Segment, SegmentKind};
@@ -226,6 +225,7 @@ pub fn analyze_flight(
         density: input.density,
         leaning: input.leaning,
         lean_table: input.lean_table,
+        track_table: None,
         warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
         indicator: options.indicator,
@@ -238,9 +238,13 @@ pub fn analyze_flight(
             .flatten();
         let of_reference = reference.and_then(|reference| reference.wind_legs.as_ref());
         let legs: Vec<&WindLegs> = of_reference.into_iter().chain(&own).collect();
-        forms.table(&believed(forms, &legs, reference))
+        let slope = ladder_slope(reference);
+        let belief = wind_legs::posterior(&legs, forms, slope.unwrap_or(TYPICAL_SLOPE));
+        let own = slope.filter(|_| !options.plain);
+        [false, true].map(|is_level| forms.table(&belief, forms.reading(own, is_level)))
     });
-    corrections.lean_table = by_forms.as_ref().or(input.lean_table);
+    corrections.lean_table = by_forms.as_ref().map(|[table, _]| table).or(input.lean_table);
+    corrections.track_table = by_forms.as_ref().map(|[_, table]| table).filter(|_| !options.plain);
     let aware = reference
         .filter(|_| input.level.is_none())
         .filter(|_| !options.plain && planned_purpose != Some(Purpose::Calibration))
@@ -331,12 +335,10 @@ fn own_legs(
     WindLegs::of(plan, &drones)
 }
 
-/// What is believed of drag and lift after the horizontal legs, if any were flown.
-fn believed(forms: &WindForms, legs: &[&WindLegs], reference: Option<&FlightAnalysis>) -> Belief {
-    let slope = reference
-        .and_then(|reference| reference.flock.as_ref()?.linear.as_ref()?.parameters.first())
-        .map_or(TYPICAL_SLOPE, |slope| slope.estimate.value);
-    wind_legs::posterior(legs, forms, slope)
+/// Pulse per vertical speed of a calibrated fleet's line, us/(m/s).
+fn ladder_slope(reference: Option<&FlightAnalysis>) -> Option<f64> {
+    let line = reference?.flock.as_ref()?.linear.as_ref()?;
+    line.parameters.first().map(|slope| slope.estimate.value)
 }
 
 /// Unusable logs named in an error.

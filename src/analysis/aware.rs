@@ -18,6 +18,7 @@ use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 use super::shape::{PARAMETERS, Shape};
 use super::split::WindowPoint;
 use super::stats::mean_sd;
+use super::track_lean;
 use super::zero::{DroneLaw, Fleet, Zero};
 use crate::flight::Flight;
 use crate::numeric::{least, mean};
@@ -197,12 +198,27 @@ impl<'a> Aware<'a> {
         let slow = Slow::of(flight);
         let pack = pack.filter(|_| slow.is_some());
         let values = Values { shape: self.zero.shape, law, zero: &self.zero };
-        let refer = |second: &Second| {
-            let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-            self.refer(second, resting_v, pack.as_ref(), &values)
+        let by_leans = |corrections: &Corrections<'_>, seconds: &[Option<Second>]| {
+            let refer = |second: &Second| {
+                let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
+                self.refer(corrections, second, resting_v, pack.as_ref(), &values)
+            };
+            seconds.iter().map(|second| second.as_ref().map(refer)).collect()
         };
-        let referred: Vec<Option<(Referred, Raw)>> =
-            hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
+        let track_table = self.corrections.track_table.filter(|_| hover.moves);
+        let referred: Vec<Option<(Referred, Raw)>> = match track_table {
+            None => by_leans(&self.corrections, &hover.seconds),
+            Some(table) => {
+                let corrections = Corrections { lean_table: Some(table), ..self.corrections };
+                let at_means = track_lean::at_mean_leans(&hover.seconds);
+                let first: Vec<Option<(Referred, Raw)>> = by_leans(&corrections, &at_means);
+                let climb_mps =
+                    |one: &Option<(Referred, Raw)>| values.air_mps(one.as_ref()?.0.pulse_us);
+                let climbs_mps: Vec<Option<f64>> = first.iter().map(climb_mps).collect();
+                let level = track_lean::at_level_leans(&hover.seconds, &climbs_mps);
+                by_leans(&corrections, &level)
+            }
+        };
         let sigmas = self.corrections.sigmas(pack.as_ref());
         let mut measured = Measured { first_s: hover.first_s, is_own: own, ..Measured::default() };
         let known = self.seconds(&mut measured, &referred, &values, hover, &sigmas);
@@ -244,7 +260,7 @@ impl<'a> Aware<'a> {
         let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let value = |second: &Second| {
             let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-            let (one, _) = self.refer(second, resting_v, pack.as_ref(), &values);
+            let (one, _) = self.refer(&self.corrections, second, resting_v, pack.as_ref(), &values);
             Some(one.velocity_mps - values.near_hover(values.air_mps(one.pulse_us)?))
         };
         let found = means.iter().map(|second| second.as_ref().and_then(value)).collect();
@@ -300,6 +316,7 @@ impl<'a> Aware<'a> {
     /// A second with what is known besides the vertical air speed taken away, and as it was logged.
     fn refer(
         &self,
+        corrections: &Corrections<'_>,
         second: &Second,
         resting_v: Option<f64>,
         pack: Option<&Pack>,
@@ -314,16 +331,16 @@ impl<'a> Aware<'a> {
             height_m: second.height_m,
             resting_v,
         };
-        if self.corrections.lean_table.is_some() {
+        if corrections.lean_table.is_some() {
             // What wind does depends on the air that is looked for: at 7 m/s the pulse answers
             // climbs half as strongly again as in still air, or more.
             for _ in 0..CLIMB_ROUNDS {
-                let pulse = self.corrections.pulse(&raw, pack);
+                let pulse = corrections.pulse(&raw, pack);
                 let Some(air_mps) = values.air_mps(pulse) else { break };
                 raw.climb_mps += CLIMB_STEP * (air_mps - raw.climb_mps);
             }
         }
-        (self.corrections.refer(&raw, pack, self.slope), raw)
+        (corrections.refer(&raw, pack, self.slope), raw)
     }
 
     /// Noise of a mean over one second, us; `slope`: pulse per vertical speed, us/(m/s).

@@ -63,6 +63,8 @@ pub(super) struct Corrections<'a> {
     pub(super) density: Option<Density>,
     pub(super) leaning: Option<Leaning>,
     pub(super) lean_table: Option<&'a LeanTable>,
+    /// The same by leans of level flight, for drones that fly along tracks ([`super::track_lean`]).
+    pub(super) track_table: Option<&'a LeanTable>,
     /// What motors that warm up do to the pulse, where a battery acts on it: standard error, us.
     pub(super) warm_up_us: Option<f64>,
     /// Share of `u - 1000` that a pack whose voltage is not known may have changed, where the law is

@@ -64,6 +64,7 @@ pub mod table;
 pub mod thermal;
 pub mod together;
 mod track;
+mod track_lean;
 mod truth;
 pub mod turbulence;
 pub mod updraft;

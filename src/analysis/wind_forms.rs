@@ -28,6 +28,11 @@ pub(super) const FORM_SHARE: f64 = 0.05;
 /// What the directions of a table leave of a doubt is added to them, up to this factor. Numerical: where they leave
 /// most, the doubt is small.
 const MOST_WIDER: f64 = 3.0;
+/// Steps of the climb to each side of hover that the slope of a ladder is taken over: 3 m/s, beyond which many ladders do not
+/// reach. Chosen.
+const LADDER_STEPS: usize = 3;
+/// Drones are not steeper than their file by more than this factor: then it is that of another drone. Chosen.
+const MOST_RATIO: f64 = 1.5;
 /// Least rise of the lean's tangent from one wind to the next: a lean must tell the wind. Numerical.
 const LEAST_RISE: f64 = 1e-5;
 
@@ -55,6 +60,21 @@ pub struct WindForms {
     pub file: Response,
     /// For each doubt, what one standard error of it adds.
     pub doubts: Vec<Response>,
+}
+
+/// How a table is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reading {
+    /// By leans as they would be in level flight, not in the climb.
+    is_level: bool,
+    /// Slope of the pulse in still air over that of the file.
+    slope_ratio: f64,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self { is_level: false, slope_ratio: 1.0 }
+    }
 }
 
 /// What is believed of the doubts of [`WindForms`], in their standard errors.
@@ -131,19 +151,44 @@ impl WindForms {
     }
 
     /// Changes of the pulse by lean and climb, us.
-    fn by_lean(response: &Response) -> Vec<Vec<f64>> {
-        let change = |step: usize, climb: usize| {
-            let tangent = (step as f64 * LEAN_STEP_DEG).to_radians().tan();
-            let place = place_in(&response.lean[climb], tangent);
+    fn by_lean(&self, response: &Response, reading: Reading) -> Vec<Vec<f64>> {
+        let climbs = response.lean.len().min(response.change_us.len());
+        let level = self.level_row().min(climbs.saturating_sub(1));
+        let change = |tangent: f64, climb: usize| {
+            let of = if reading.is_level { level } else { climb };
+            let place = place_in(&response.lean[of], tangent);
             between(&response.change_us[climb], place)
         };
-        let climbs = response.lean.len().min(response.change_us.len());
-        (0..LEANS).map(|step| (0..climbs).map(|climb| change(step, climb)).collect()).collect()
+        let row = |step: usize| {
+            let tangent = (step as f64 * LEAN_STEP_DEG).to_radians().tan();
+            let row: Vec<f64> = (0..climbs).map(|climb| change(tangent, climb)).collect();
+            let at_level = row.get(level).copied().unwrap_or_default();
+            row.iter().map(|us| at_level + reading.slope_ratio * (us - at_level)).collect()
+        };
+        (0..LEANS).map(row).collect()
+    }
+
+    /// Slope of a line through the file's pulses without wind, us/(m/s), as one is fitted to a ladder.
+    fn calm_slope(&self) -> Option<f64> {
+        let level = self.level_row();
+        let steps = level.min(self.calm_us.len().checked_sub(level + 1)?).min(LADDER_STEPS);
+        let (low, high) = (self.calm_us.get(level - steps)?, self.calm_us.get(level + steps)?);
+        let slope = (high - low) / (2.0 * steps as f64 * self.climb_step_mps);
+        (slope > 0.0).then_some(slope)
+    }
+
+    /// Readings of tables for drones with this slope of the pulse in still air, us/(m/s): what they gain in wind goes with it, as
+    /// both go with what a change of the flow through the disc does.
+    pub(super) fn reading(&self, slope: Option<f64>, is_level: bool) -> Reading {
+        let ratio = slope.zip(self.calm_slope()).map_or(1.0, |(own, file)| own / file);
+        let slope_ratio =
+            if ratio.is_finite() { ratio.clamp(MOST_RATIO.recip(), MOST_RATIO) } else { 1.0 };
+        Reading { is_level, slope_ratio }
     }
 
     /// Standard error of a map in one wind that was calibrated in another, m/s, by these doubts alone.
     pub(super) fn error_mps(&self, belief: &Belief, calibrated_mps: f64, wind_mps: f64) -> f64 {
-        let table = self.table(belief);
+        let table = self.table(belief, Reading::default());
         let lean_deg = |wind_mps| self.level(&belief.mean, wind_mps)[0].atan().to_degrees();
         let doubts = |wind_mps| table.doubts_at(lean_deg(wind_mps), 0.0).unwrap_or_default();
         let (there, here) = (doubts(calibrated_mps), doubts(wind_mps));
@@ -158,16 +203,16 @@ impl WindForms {
     }
 
     /// The table of a belief: its mean, with the doubts as few directions.
-    pub(super) fn table(&self, belief: &Belief) -> LeanTable {
+    pub(super) fn table(&self, belief: &Belief, reading: Reading) -> LeanTable {
         let at = |doubts: &DVector<f64>| self.file.plus(&self.doubts, doubts);
         let middle = at(&belief.mean);
-        let change_us = Self::by_lean(&middle);
+        let change_us = self.by_lean(&middle, reading);
         let eigen = SymmetricEigen::new(belief.covariance.clone());
         let mut moved: Vec<Vec<Vec<f64>>> = Vec::new();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             let step = vector * value.max(0.0).sqrt();
-            let more = Self::by_lean(&at(&(&belief.mean + &step)));
-            let less = Self::by_lean(&at(&(&belief.mean - &step)));
+            let more = self.by_lean(&at(&(&belief.mean + &step)), reading);
+            let less = self.by_lean(&at(&(&belief.mean - &step)), reading);
             moved.push(combined(&[more, less], &[0.5, -0.5]));
         }
         moved.push(combined(std::slice::from_ref(&change_us), &[FORM_SHARE]));
@@ -278,7 +323,7 @@ pub(super) mod tests {
     #[test]
     fn a_table_reads_the_wind_by_the_lean_and_its_doubts_grow_with_the_wind() {
         let forms = forms();
-        let table = forms.table(&forms.prior());
+        let table = forms.table(&forms.prior(), Reading::default());
         let lean_deg = |wind: f64| (0.02 * wind + 0.001 * wind * wind).atan().to_degrees();
         for wind in [1.0, 4.0, 8.0] {
             let read = table.wind_at(lean_deg(wind)).unwrap();
@@ -296,11 +341,41 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_level_lean_reads_one_wind_at_all_climbs_and_what_wind_adds_goes_with_the_slope() {
+        let mut forms = forms();
+        for (climb, (lean, change_us)) in
+            forms.file.lean.iter_mut().zip(&mut forms.file.change_us).enumerate()
+        {
+            let by_climb = 1.0 + 0.05 * (climb as f64 - 2.0);
+            for lean in lean.iter_mut() {
+                *lean *= by_climb;
+            }
+            for us in change_us.iter_mut() {
+                *us *= 1.5 - 0.25 * climb as f64;
+            }
+        }
+        let lean_deg = (0.02 * 4.0 + 0.001 * 16.0_f64).atan().to_degrees();
+        let table = |reading| forms.table(&forms.prior(), reading);
+        let level = table(forms.reading(None, true));
+        let change_us = |table: &LeanTable, climb_mps: f64| table.at(lean_deg, climb_mps);
+        assert!((change_us(&level, 1.0) + 0.75 * 8.0).abs() < 0.1, "{}", change_us(&level, 1.0));
+        let of_moment = table(forms.reading(None, false));
+        assert!(change_us(&of_moment, 1.0) > change_us(&level, 1.0) + 0.3, "a lesser wind");
+        assert_eq!(change_us(&of_moment, 0.0), change_us(&level, 0.0));
+        let steep = table(forms.reading(Some(26.0 * 1.2), true));
+        assert!((change_us(&steep, 0.0) - change_us(&level, 0.0)).abs() < 1e-12);
+        let gained = |table: &LeanTable| change_us(table, 1.0) - change_us(table, -1.0);
+        assert!((gained(&steep) - 1.2 * gained(&level)).abs() < 1e-9);
+        assert_eq!(forms.reading(Some(1e9), true).slope_ratio, MOST_RATIO);
+        assert_eq!(forms.reading(Some(f64::NAN), true).slope_ratio, 1.0);
+    }
+
+    #[test]
     fn what_is_known_is_not_doubted_but_for_the_form() {
         let forms = forms();
         let known = Belief { mean: DVector::from_vec(vec![0.0, 1.0]), ..forms.prior() };
         let known = Belief { covariance: known.covariance * 1e-6, ..known };
-        let table = forms.table(&known);
+        let table = forms.table(&known, Reading::default());
         let lean_deg = 0.224_f64.atan().to_degrees();
         assert!((table.at(lean_deg, 0.0) + 0.6 * 64.0).abs() < 0.3);
         let doubts = table.doubts_at(lean_deg, 0.0).unwrap();

@@ -24,6 +24,9 @@ const SMALL_US: f64 = 2.5;
 const QUIET_US: f64 = 5.0;
 /// What moves the pulse by less does not matter in the quietest flight, us (rms).
 const HARDLY_US: f64 = 0.75;
+/// A raw gap, without the air that drones share, below this multiple of what noise and air leave is all noise and air. Chosen:
+/// what is unknown and there made it 1.14 times as large and more.
+const AT_FLOOR: f64 = 1.1;
 
 /// What is searched for, and in what.
 #[derive(Clone, Copy)]
@@ -106,8 +109,11 @@ impl Question<'_> {
         if !grows(&gap) {
             return Ok((found, gap));
         }
-        let found = self.withdrawn(train, found, &before)?;
+        let mut found = self.withdrawn(train, found, &before)?;
         let gap = self.case(&found).gap(train, held)?;
+        if is_at_floor(&gap) {
+            found.steps.retain(is_more_than_chance);
+        }
         Ok((found, gap))
     }
 
@@ -227,6 +233,18 @@ pub(super) fn grows(gap: &Gap) -> bool {
     })
 }
 
+/// Whether the model as it was is as near to drones and rungs that were not fitted as noise and air leave it.
+fn is_at_floor(gap: &Gap) -> bool {
+    let all = [&gap.drones, &gap.rungs];
+    let mut all = all.into_iter().flatten().peekable();
+    all.peek().is_some() && all.all(|one| one.before_without_air_us < AT_FLOOR * one.floor_us)
+}
+
+/// Something unknown that could not be taken in, where no gap shows it, must explain its price twice.
+fn is_more_than_chance(step: &Step) -> bool {
+    !matches!(step.finding, Finding::Unknown { .. }) || step.gain_nats > 2.0 * step.threshold_nats
+}
+
 /// A finding that cannot be taken in: its effects with the rival that explains most, by its own search or by those of
 /// `others` if nothing was searched for beside it. `None`: an effect without a rival, of which nothing can be said.
 fn withdrawn(mut step: Step, others: &[Step]) -> Option<Step> {
@@ -278,6 +296,28 @@ mod tests {
         let unknown = Finding::Unknown { depends_on: Dependence::Climb, formula: None };
         let kept = alone(step(unknown.clone(), &["one"])).unwrap();
         assert_eq!(kept.finding, unknown);
+    }
+
+    #[test]
+    fn an_unknown_that_no_gap_shows_must_explain_its_price_twice() {
+        let gap = |drones_us: f64, rungs_us: f64| {
+            let of = |before_without_air_us: f64| {
+                Some(Shrink { before_without_air_us, floor_us: 10.0, ..Shrink::default() })
+            };
+            Gap { drones: of(drones_us), rungs: of(rungs_us) }
+        };
+        assert!(is_at_floor(&gap(9.0, 10.9)));
+        assert!(!is_at_floor(&gap(9.0, 11.1)), "the rungs show it");
+        assert!(!is_at_floor(&gap(11.1, 9.0)), "the drones show it");
+        assert!(!is_at_floor(&Gap::default()), "nothing was held out");
+        let unknown = || Finding::Unknown { depends_on: Dependence::Step, formula: None };
+        let of = |finding: Finding, gain_nats: f64| {
+            let threshold_nats = 14.0;
+            is_more_than_chance(&Step { gain_nats, threshold_nats, ..step(finding, &[]) })
+        };
+        assert!(!of(unknown(), 27.0));
+        assert!(of(unknown(), 29.0));
+        assert!(of(name("battery"), 9.0), "an effect is told with its rival");
     }
 
     #[test]

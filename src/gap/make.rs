@@ -205,7 +205,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let instead = |one: &Parameter| {
         Role::MomentumDrag.is_of(one.effect) || of_body.as_deref() == Some(one.effect)
     };
-    steps.extend(leans.filter(|_| !found.parameters.iter().any(instead)));
+    let leans = leans.filter(|_| !found.parameters.iter().any(instead));
+    super::single::beside_what_leans_tell(&mut steps, leans.as_ref());
+    steps.extend(leans);
     let mut cautions = warnings(&data, &found, &shrink, input);
     as_in_file(&mut steps, vehicle, input.vehicle);
     if let Some((place, value)) = read_from_logs(vehicle, input.vehicle) {

@@ -18,8 +18,9 @@ use crate::effects::{Role, Signal, find};
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
 const AT_BOUND: f64 = 1e-3;
-/// An unknown that explains more than this share of what a name explains may be the same. Chosen.
-const UNKNOWN_SHARE: f64 = 0.5;
+/// An unknown that explains more than this share of what a name explains may be the same. Chosen: other forms of the same
+/// physics left up to a seventh.
+const UNKNOWN_SHARE: f64 = 1.0 / 7.0;
 /// Share of a larger effect's size below which another form of that one may be meant. Chosen: other forms of the same
 /// physics left up to a seventh.
 const SMALL: f64 = 0.2;
@@ -172,7 +173,7 @@ fn at_their_bounds(found: &mut Found) {
 }
 
 /// Names beside something unknown that may be the same: what was found together with it, and what depends on the same
-/// and explains hardly more. An effect that the model has, found after it with another size, may be what the free shape leaves of
+/// and explains hardly more; a step in time sets the climbs that were flown before it against those after it. An effect that the model has, found after it with another size, may be what the free shape leaves of
 /// the unknown.
 fn beside_something_unknown(steps: &mut [Step]) {
     let unknown: Vec<(usize, Dependence, f64)> = steps
@@ -187,7 +188,8 @@ fn beside_something_unknown(steps: &mut [Step]) {
         let Some(effect) = lone_name(step) else { continue };
         let is_new = new_name(step).is_some();
         let near = unknown.iter().find(|(of, depends_on, gain_nats)| {
-            let alike = depends_on.may_show(effect);
+            let is_step = *depends_on == Dependence::Step;
+            let alike = depends_on.may_show(effect) || is_step && depends_on_climb(effect);
             let is_after = *of < place && (is_new || alike);
             is_after || is_new && alike && *gain_nats > UNKNOWN_SHARE * step.gain_nats
         });
@@ -224,11 +226,28 @@ fn beside_what_the_air_may_be(steps: &mut [Step]) {
     }
 }
 
-/// Names beside a free shape that is left, depends on the same and explains a fair share of what the name does: an effect is
+/// Names beside what is left, if that depends on the same and explains a fair share of what the name does: an effect is
 /// named alone only if it leaves nothing of its kind. What is left may be no finding because it hardly matters, or because only
 /// the scatter between drones shows it.
 fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
-    let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
+    match Dependence::of(&rest.candidate) {
+        Some(depends_on) => beside_a_shape_that_is_left(steps, rest, depends_on),
+        None => beside_an_effect_that_is_left(steps, rest),
+    }
+}
+
+/// Names beside an effect that is left, new or with another size than the model's.
+fn beside_an_effect_that_is_left(steps: &mut [Step], rest: &Rest) {
+    for step in steps {
+        let Some(effect) = lone_name(step) else { continue };
+        let least_nats = rest.threshold_nats.max(RIVAL_SHARE * step.gain_nats);
+        let is_other = rest.candidate != effect && depend_on_the_same(&rest.candidate, effect);
+        let is_left = is_other && rest.gain_nats > least_nats;
+        doubt(step, is_left.then(|| rest.candidate.clone()));
+    }
+}
+
+fn beside_a_shape_that_is_left(steps: &mut [Step], rest: &Rest, depends_on: Dependence) {
     for step in steps {
         let Some(effect) = new_name(step) else { continue };
         // Bodies and rotors feel the whole air: one thing may show in the climb and, by another form, in the wind.
@@ -275,6 +294,18 @@ fn beside_a_class(steps: &mut [Step]) {
         let mut firsts = before.filter_map(|(_, effects)| effects.first());
         let first = firsts.find(|first| **first != effect && depend_on_the_same(first, &effect));
         doubt(step, first.cloned());
+    }
+}
+
+/// Names of what depends on the same as a class that leans tell: which drag it is decides the wind that the pulse is held
+/// against.
+pub(super) fn beside_what_leans_tell(steps: &mut [Step], leans: Option<&Step>) {
+    let Some(Finding::Class { effects, .. }) = leans.map(|step| &step.finding) else { return };
+    for step in steps {
+        let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
+        let first = effects.first();
+        let other = first.filter(|first| **first != effect && depend_on_the_same(first, &effect));
+        doubt(step, other.cloned());
     }
 }
 
@@ -394,14 +425,19 @@ mod tests {
             told(&steps)
         };
         let climb = || unknown(Dependence::Climb);
-        assert_eq!(of(name("face-drag"), 101.0, climb())[0], "face-drag");
-        assert_eq!(of(name("face-drag"), 99.0, climb())[0], "face-drag climb");
+        assert_eq!(of(name("face-drag"), 351.0, climb())[0], "face-drag");
+        assert_eq!(of(name("face-drag"), 349.0, climb())[0], "face-drag climb");
         assert_eq!(
             of(name("battery"), 99.0, climb())[0],
             "battery",
             "it depends on something else"
         );
         assert_eq!(of(climb(), 9.0, name("battery"))[1], "battery climb", "found together with it");
+        let in_a_step = || unknown(Dependence::Step);
+        assert_eq!(of(name("face-drag"), 349.0, in_a_step())[0], "face-drag step");
+        assert_eq!(of(name("face-drag"), 351.0, in_a_step())[0], "face-drag");
+        let lift = of(name("translational-lift"), 99.0, in_a_step());
+        assert_eq!(lift[0], "translational-lift step", "it depends on the climb as well");
     }
 
     #[test]
@@ -436,6 +472,26 @@ mod tests {
         let mut steps = vec![step(name("translational-lift"), 129.0, 20.0, &[]), drags];
         beside_a_class(&mut steps);
         assert_eq!(told(&steps)[0], "translational-lift", "found before");
+    }
+
+    #[test]
+    fn what_leans_leave_in_doubt_is_in_doubt_in_the_pulse() {
+        let beside = |effect: &str, leans: &[&str]| {
+            let mut steps = vec![step(name(effect), 38.0, 20.0, &[])];
+            let leans = match leans {
+                [one] => name(one),
+                several => class(several),
+            };
+            beside_what_leans_tell(&mut steps, Some(&step(leans, 15.0, 12.0, &[])));
+            told(&steps).concat()
+        };
+        let drags = ["blade-flapping", "momentum-drag"];
+        assert_eq!(beside("translational-lift", &drags), "translational-lift blade-flapping");
+        assert_eq!(beside("translational-lift", &drags[..1]), "translational-lift", "a name");
+        assert_eq!(beside("battery", &drags), "battery", "it depends on something else");
+        let mut steps = vec![step(name("translational-lift"), 38.0, 20.0, &[])];
+        beside_what_leans_tell(&mut steps, None);
+        assert_eq!(told(&steps).concat(), "translational-lift");
     }
 
     #[test]
@@ -527,7 +583,10 @@ mod tests {
         assert_eq!(told_with("wind", 21.0), "face-drag");
         assert_eq!(told_with("wind", 21.0 + 1e-9), "face-drag wind", "a body feels the whole air");
         assert_eq!(told_with("voltage", 90.0), "face-drag", "a drag has no battery");
-        assert_eq!(told_with("rotor-inflow", 90.0), "face-drag", "an effect is none of them");
+        assert_eq!(told_with("rotor-inflow", 21.0), "face-drag");
+        assert_eq!(told_with("rotor-inflow", 21.0 + 1e-9), "face-drag rotor-inflow");
+        assert_eq!(told_with("face-drag", 90.0), "face-drag", "another size of the same");
+        assert_eq!(told_with("motor-thermal", 90.0), "face-drag", "it depends on something else");
         assert_eq!(of("face-drag", 20.0, "climb", 10.0), "face-drag", "chance gains as much");
         assert_eq!(of("face-drag", 20.0, "wind", 14.0), "face-drag", "chance gains as much");
         let curve = of("thrust-curve", 84.0, "climb-time", 67.0);

@@ -101,3 +101,12 @@ fn a_scan_of_a_vehicle_that_leans_less_than_its_file_says_is_near_the_truth() {
     assert!(posterior.rms_mps < 0.2 && posterior.inside_share.unwrap() > 0.8, "{posterior:?}");
     assert_eq!(posterior.limit_rms_mps, None, "no covariance of what the lean leaves is known");
 }
+
+#[test]
+fn along_legs_rising_air_is_neither_too_strong_nor_another_wind() {
+    let passes = Override::new("scan.passes", 1);
+    let [plain, posterior] = flown("scan-campaign", 4, passes, "thermal", 7003);
+    println!("each second alone {plain:?}, posterior {posterior:?}");
+    assert!(posterior.rms_without_bias_mps < 0.11, "{posterior:?}");
+    assert!(posterior.inside_share.unwrap() > 0.9, "{posterior:?}");
+}
