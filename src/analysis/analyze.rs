@@ -21,6 +21,7 @@ use super::kriging::Drone;
 use super::ladder::{FleetLadders, is_ladder, rungs};
 use super::law::{LawKind, LawOf, Symbol};
 use super::laws_of_others;
+use super::lean_table::LeanTable;
 use super::levelled;
 use super::map_statistics::{HoverSeen, of_map};
 use super::measured::Measured;
@@ -240,8 +241,12 @@ pub fn analyze_flight(
         let legs: Vec<&WindLegs> = of_reference.into_iter().chain(&own).collect();
         let slope = ladder_slope(reference);
         let belief = wind_legs::posterior(&legs, forms, slope.unwrap_or(TYPICAL_SLOPE));
-        let own = slope.filter(|_| !options.plain);
-        [false, true].map(|is_level| forms.table(&belief, forms.reading(own, is_level)))
+        let by_file = forms.tables(&belief, 1.0);
+        let is_calm = reference.is_some_and(|found| is_calm(found, &by_file[0]));
+        match slope.filter(|_| is_calm && !options.plain) {
+            Some(own) => forms.tables(&belief, forms.slope_ratio(own)),
+            None => by_file,
+        }
     });
     corrections.lean_table = by_forms.as_ref().map(|[table, _]| table).or(input.lean_table);
     corrections.track_table = by_forms.as_ref().map(|[_, table]| table).filter(|_| !options.plain);
@@ -339,6 +344,17 @@ fn own_legs(
 fn ladder_slope(reference: Option<&FlightAnalysis>) -> Option<f64> {
     let line = reference?.flock.as_ref()?.linear.as_ref()?;
     line.parameters.first().map(|slope| slope.estimate.value)
+}
+
+/// Wind in which a ladder's slope is that of still air, m/s: a show drone is 16 % steeper in 2 m/s.
+const CALM_MPS: f64 = 2.0;
+
+/// Whether the leans of a calibration's hovers tell no wind that makes the pulse steeper.
+fn is_calm(reference: &FlightAnalysis, table: &LeanTable) -> bool {
+    let windows = reference.drones.iter().flat_map(|drone| &drone.windows);
+    let leans = windows.filter(|window| window.kind.is_hover()).map(|window| window.lean_deg);
+    let wind_mps = mean(leans).and_then(|lean_deg| table.wind_at(lean_deg));
+    wind_mps.is_some_and(|mps| mps < CALM_MPS)
 }
 
 /// Unusable logs named in an error.

@@ -198,27 +198,25 @@ impl<'a> Aware<'a> {
         let slow = Slow::of(flight);
         let pack = pack.filter(|_| slow.is_some());
         let values = Values { shape: self.zero.shape, law, zero: &self.zero };
-        let by_leans = |corrections: &Corrections<'_>, seconds: &[Option<Second>]| {
-            let refer = |second: &Second| {
-                let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-                self.refer(corrections, second, resting_v, pack.as_ref(), &values)
-            };
+        let track_table = self.corrections.track_table.filter(|_| hover.moves);
+        let on_track =
+            track_table.map(|table| Corrections { lean_table: Some(table), ..self.corrections });
+        let refer = |second: &Second| {
+            let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
+            let on_track = on_track.as_ref().filter(|_| track_lean::is_level(second));
+            let corrections = on_track.unwrap_or(&self.corrections);
+            self.refer(corrections, second, resting_v, pack.as_ref(), &values)
+        };
+        let all = |seconds: &[Option<Second>]| -> Vec<Option<(Referred, Raw)>> {
             seconds.iter().map(|second| second.as_ref().map(refer)).collect()
         };
-        let track_table = self.corrections.track_table.filter(|_| hover.moves);
-        let referred: Vec<Option<(Referred, Raw)>> = match track_table {
-            None => by_leans(&self.corrections, &hover.seconds),
-            Some(table) => {
-                let corrections = Corrections { lean_table: Some(table), ..self.corrections };
-                let at_means = track_lean::at_mean_leans(&hover.seconds);
-                let first: Vec<Option<(Referred, Raw)>> = by_leans(&corrections, &at_means);
-                let climb_mps =
-                    |one: &Option<(Referred, Raw)>| values.air_mps(one.as_ref()?.0.pulse_us);
-                let climbs_mps: Vec<Option<f64>> = first.iter().map(climb_mps).collect();
-                let level = track_lean::at_level_leans(&hover.seconds, &climbs_mps);
-                by_leans(&corrections, &level)
-            }
-        };
+        let mut referred = all(&hover.seconds);
+        if on_track.is_some() {
+            let climb_mps =
+                |one: &Option<(Referred, Raw)>| values.air_mps(one.as_ref()?.0.pulse_us);
+            let climbs_mps: Vec<Option<f64>> = referred.iter().map(climb_mps).collect();
+            referred = all(&track_lean::at_level_leans(&hover.seconds, &climbs_mps));
+        }
         let sigmas = self.corrections.sigmas(pack.as_ref());
         let mut measured = Measured { first_s: hover.first_s, is_own: own, ..Measured::default() };
         let known = self.seconds(&mut measured, &referred, &values, hover, &sigmas);

@@ -4,21 +4,29 @@
 //! rotors' drag goes with the flow through the disc, by more or less of it in each vehicle (the H-force of blade elements, Leishman
 //! 2006, 5.4; none in a drag that was fitted to flights in one wind). Held against a table by lean and climb such a lean
 //! is another wind, and the slope of the pulse by which the air is measured is wrong by a tenth. So what the climb does
-//! to the lean is told by the track itself, and taken away: what is left is the wind's.
-
-use std::ops::Range;
+//! to the lean is told by the track itself, and taken away: what is left is the wind's. How well the track tells it is no
+//! part of the errors: what is not known of it is what is usual, some hundredths.
 
 use super::hover::Second;
 use super::running::RUNNING_S;
 use crate::numeric::mean;
 
-/// Standard error of the change of the lean for each m/s of climb through the air, as a share of the lean, s/m: -0.04 with a
-/// drag of the rotors alone, +0.03 to +0.06 by blade elements (the planned show drone, and the second plant of foreign
-/// worlds, at 4 m/s).
+/// Change of the lean for each m/s of climb through the air that is usual, as a share of the lean, s/m: -0.04 with a drag of the
+/// rotors alone, 0.03 to 0.06 by blade elements (the planned show drone, and the second plant of foreign worlds, at 4
+/// m/s). The standard deviation of what is believed beforehand.
 const LEAN_BY_CLIMB: f64 = 0.05;
+/// More than so much of it is none, s/m: leans of gusts that look like a climb. Chosen.
+const MOST_BY_CLIMB: f64 = 2.0 * LEAN_BY_CLIMB;
+/// Drones that climb or descend by less fly level, m/s. Chosen: followed to a tenth.
+const LEVEL_MPS: f64 = 0.3;
 
-/// The seconds of a track with leans as they would be without the climb through the air; `climbs_mps` is that climb, where it is
-/// known, by leans that are held at their mean.
+/// Whether a drone flies level in this second: what it climbs through is then the air's own motion.
+pub(super) fn is_level(second: &Second) -> bool {
+    second.velocity_mps.abs() < LEVEL_MPS
+}
+
+/// The seconds of a track, those of level flight with leans as they would be without the climb through the air; `climbs_mps` is
+/// that climb where it is known, by the leans as they are.
 pub(super) fn at_level_leans(
     seconds: &[Option<Second>],
     climbs_mps: &[Option<f64>],
@@ -26,40 +34,29 @@ pub(super) fn at_level_leans(
     let by_climb = by_climb(seconds, climbs_mps);
     let level = |(second, climb_mps): (&Option<Second>, &Option<f64>)| {
         let factor = (1.0 - by_climb * climb_mps.unwrap_or_default()).max(0.0);
-        second.map(|second| Second { lean_deg: second.lean_deg * factor, ..second })
+        let second = (*second)?;
+        let lean_deg = second.lean_deg * if is_level(&second) { factor } else { 1.0 };
+        Some(Second { lean_deg, ..second })
     };
     seconds.iter().zip(climbs_mps).map(level).collect()
 }
 
-/// The seconds of a track with leans at the mean of their stretch.
-pub(super) fn at_mean_leans(seconds: &[Option<Second>]) -> Vec<Option<Second>> {
-    let mut found = seconds.to_vec();
-    for stretch in stretches(seconds) {
-        let known = || seconds[stretch.clone()].iter().flatten();
-        let Some(lean_deg) = mean(known().map(|second| second.lean_deg)) else { continue };
-        for second in found[stretch.clone()].iter_mut().flatten() {
-            second.lean_deg = lean_deg;
-        }
-    }
-    found
-}
-
-/// Change of the lean for each m/s of climb, as a share of the lean, s/m: a line through the seconds of each stretch, and
+/// Change of the lean for each m/s of climb, as a share of the lean, s/m: a line through the level seconds of each stretch, and
 /// what is usual.
 fn by_climb(seconds: &[Option<Second>], climbs_mps: &[Option<f64>]) -> f64 {
+    let together: Vec<(&Option<Second>, &Option<f64>)> = seconds.iter().zip(climbs_mps).collect();
     let (mut squares, mut products, mut leans, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for stretch in stretches(seconds) {
-        let known: Vec<[f64; 2]> = stretch
-            .filter_map(|index| Some([climbs_mps[index]?, seconds[index].as_ref()?.lean_deg]))
-            .collect();
-        let n = known.len() as f64;
-        let of = |axis: usize| known.iter().map(|one| one[axis]).sum::<f64>() / n;
-        let (climb_mps, lean_deg) = (of(0), of(1));
-        if known.len() < 2 || lean_deg <= 0.0 {
-            continue;
-        }
-        for [climb, lean] in known {
-            let (x, y) = (climb - climb_mps, lean / lean_deg - 1.0);
+    // Between the legs of a track are seconds without values.
+    for stretch in together.chunk_by(|one, next| one.0.is_some() && next.0.is_some()) {
+        let of = |(second, climb_mps): &(&Option<Second>, &Option<f64>)| {
+            let second = second.filter(is_level)?;
+            Some(((**climb_mps)?, second.lean_deg))
+        };
+        let known: Vec<(f64, f64)> = stretch.iter().filter_map(of).collect();
+        let climb_mps = mean(known.iter().map(|one| one.0)).unwrap_or_default();
+        let lean_deg = mean(known.iter().map(|one| one.1)).unwrap_or_default();
+        for (climb, lean) in known {
+            let (x, y) = (lean_deg * (climb - climb_mps), lean - lean_deg);
             squares += x * x;
             products += x * y;
             leans += y * y;
@@ -72,25 +69,15 @@ fn by_climb(seconds: &[Option<Second>], climbs_mps: &[Option<f64>]) -> f64 {
     let left = (leans - products * products / squares).max(0.0) / f64::max(count - 2.0, 1.0);
     // Running means have so few values of their own.
     let prior = RUNNING_S * left / (LEAN_BY_CLIMB * LEAN_BY_CLIMB);
-    products / (squares + prior)
-}
-
-/// Stretches of seconds that have values, one after the other.
-fn stretches(seconds: &[Option<Second>]) -> Vec<Range<usize>> {
-    let mut end = 0;
-    let stretch = |part: &[Option<Second>]| {
-        let start = end;
-        end += part.len();
-        part[0].is_some().then_some(start..end)
-    };
-    seconds.chunk_by(|one, next| one.is_some() == next.is_some()).filter_map(stretch).collect()
+    (products / (squares + prior)).clamp(-MOST_BY_CLIMB, MOST_BY_CLIMB)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two legs through rising air, against the wind and with it; the lean falls by a share of it for each m/s of climb.
+    /// Two legs through rising air, against the wind and with it: the lean changes by a share of it for each m/s of climb
+    /// through the air, which falls where that rises.
     fn track(by_climb: f64, gust_deg: f64) -> (Vec<Option<Second>>, Vec<Option<f64>>) {
         let second = |index: usize| {
             let leg = index / 50;
@@ -126,22 +113,37 @@ mod tests {
     }
 
     #[test]
-    fn in_gusts_a_track_tells_little_and_leans_stay() {
-        let (seconds, climbs_mps) = track(0.06, 0.0);
-        let exact = by_climb(&seconds, &climbs_mps);
-        let (gusty, climbs_mps) = track(0.06, 1.5);
-        let shrunk = by_climb(&gusty, &climbs_mps);
-        assert!(exact > 0.05 && shrunk < 0.5 * exact, "{exact} {shrunk}");
-        let climbs_mps = vec![None; 100];
-        assert_eq!(by_climb(&seconds, &climbs_mps), 0.0, "no climb is known");
+    fn in_gusts_a_track_tells_little_and_never_more_than_rotors_do() {
+        let of = |by: f64, gust_deg: f64| {
+            let (seconds, climbs_mps) = track(by, gust_deg);
+            by_climb(&seconds, &climbs_mps)
+        };
+        assert!(of(0.06, 0.0) > 0.05 && of(0.06, 1.5) < 0.03, "{}", of(0.06, 1.5));
+        assert_eq!(of(0.3, 0.0), MOST_BY_CLIMB);
+        assert_eq!(of(-0.3, 0.0), -MOST_BY_CLIMB);
+        let (seconds, _) = track(0.06, 0.0);
+        assert_eq!(by_climb(&seconds, &[None; 100]), 0.0, "no climb is known");
+        assert_eq!(by_climb(&[], &[]), 0.0);
     }
 
     #[test]
-    fn each_leg_has_its_own_mean() {
-        let (seconds, _) = track(0.0, 0.0);
-        let means = at_mean_leans(&seconds);
-        assert!((means[3].unwrap().lean_deg - 4.0).abs() < 1e-12);
-        assert!((means[60].unwrap().lean_deg - 2.5).abs() < 1e-12);
-        assert_eq!(means[49], None);
+    fn a_leg_with_the_wind_leans_little_and_counts_for_little() {
+        let (mut seconds, climbs_mps) = track(0.06, 0.0);
+        for second in seconds[50..].iter_mut().flatten() {
+            second.lean_deg = 0.1 + 0.1 * (second.time_s * 1.7).sin();
+        }
+        let told = by_climb(&seconds, &climbs_mps);
+        assert!(told > 0.05, "{told}");
+    }
+
+    #[test]
+    fn a_drone_that_climbs_by_itself_leans_as_it_does() {
+        let (mut seconds, climbs_mps) = track(0.06, 0.0);
+        for second in seconds[50..].iter_mut().flatten() {
+            second.velocity_mps = 2.0;
+        }
+        let level = at_level_leans(&seconds, &climbs_mps);
+        assert_eq!(level[70], seconds[70]);
+        assert!((level[20].unwrap().lean_deg - 4.0).abs() < 0.08);
     }
 }

@@ -28,10 +28,9 @@ pub(super) const FORM_SHARE: f64 = 0.05;
 /// What the directions of a table leave of a doubt is added to them, up to this factor. Numerical: where they leave
 /// most, the doubt is small.
 const MOST_WIDER: f64 = 3.0;
-/// Steps of the climb to each side of hover that the slope of a ladder is taken over: 3 m/s, beyond which many ladders do not
-/// reach. Chosen.
+/// Steps of the climb to each side of hover that the file's slope is taken over: 3 m/s, about what ladders reach. Chosen.
 const LADDER_STEPS: usize = 3;
-/// Drones are not steeper than their file by more than this factor: then it is that of another drone. Chosen.
+/// Drones are not steeper than their file by more than this factor, nor flatter: then it is that of another drone. Chosen.
 const MOST_RATIO: f64 = 1.5;
 /// Least rise of the lean's tangent from one wind to the next: a lean must tell the wind. Numerical.
 const LEAST_RISE: f64 = 1e-5;
@@ -63,18 +62,12 @@ pub struct WindForms {
 }
 
 /// How a table is read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Reading {
+#[derive(Clone, Copy)]
+struct Reading {
     /// By leans as they would be in level flight, not in the climb.
     is_level: bool,
     /// Slope of the pulse in still air over that of the file.
     slope_ratio: f64,
-}
-
-impl Default for Reading {
-    fn default() -> Self {
-        Self { is_level: false, slope_ratio: 1.0 }
-    }
 }
 
 /// What is believed of the doubts of [`WindForms`], in their standard errors.
@@ -168,7 +161,7 @@ impl WindForms {
         (0..LEANS).map(row).collect()
     }
 
-    /// Slope of a line through the file's pulses without wind, us/(m/s), as one is fitted to a ladder.
+    /// Slope between the file's pulses in a climb and in a descent without wind, us/(m/s).
     fn calm_slope(&self) -> Option<f64> {
         let level = self.level_row();
         let steps = level.min(self.calm_us.len().checked_sub(level + 1)?).min(LADDER_STEPS);
@@ -177,18 +170,16 @@ impl WindForms {
         (slope > 0.0).then_some(slope)
     }
 
-    /// Readings of tables for drones with this slope of the pulse in still air, us/(m/s): what they gain in wind goes with it, as
-    /// both go with what a change of the flow through the disc does.
-    pub(super) fn reading(&self, slope: Option<f64>, is_level: bool) -> Reading {
-        let ratio = slope.zip(self.calm_slope()).map_or(1.0, |(own, file)| own / file);
-        let slope_ratio =
-            if ratio.is_finite() { ratio.clamp(MOST_RATIO.recip(), MOST_RATIO) } else { 1.0 };
-        Reading { is_level, slope_ratio }
+    /// Slope of the pulse of drones that were calibrated in still air, us/(m/s), over that of the file: what they gain in wind goes
+    /// with it, as both go with what a change of the flow through the disc does. 1 where the file is that of another drone.
+    pub(super) fn slope_ratio(&self, slope: f64) -> f64 {
+        let ratio = self.calm_slope().map_or(1.0, |of_file| slope / of_file);
+        if (MOST_RATIO.recip()..=MOST_RATIO).contains(&ratio) { ratio } else { 1.0 }
     }
 
     /// Standard error of a map in one wind that was calibrated in another, m/s, by these doubts alone.
     pub(super) fn error_mps(&self, belief: &Belief, calibrated_mps: f64, wind_mps: f64) -> f64 {
-        let table = self.table(belief, Reading::default());
+        let [table, _] = self.tables(belief, 1.0);
         let lean_deg = |wind_mps| self.level(&belief.mean, wind_mps)[0].atan().to_degrees();
         let doubts = |wind_mps| table.doubts_at(lean_deg(wind_mps), 0.0).unwrap_or_default();
         let (there, here) = (doubts(calibrated_mps), doubts(wind_mps));
@@ -202,20 +193,25 @@ impl WindForms {
         apart.sqrt() / slope.max(1.0)
     }
 
-    /// The table of a belief: its mean, with the doubts as few directions.
-    pub(super) fn table(&self, belief: &Belief, reading: Reading) -> LeanTable {
+    /// The tables of a belief by leans as they are, and by leans as they would be in level flight: its mean, with the doubts
+    /// as few directions that are the same in both; for drones whose slope in still air is so many times that of the file.
+    pub(super) fn tables(&self, belief: &Belief, slope_ratio: f64) -> [LeanTable; 2] {
         let at = |doubts: &DVector<f64>| self.file.plus(&self.doubts, doubts);
         let middle = at(&belief.mean);
-        let change_us = self.by_lean(&middle, reading);
         let eigen = SymmetricEigen::new(belief.covariance.clone());
-        let mut moved: Vec<Vec<Vec<f64>>> = Vec::new();
-        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            let step = vector * value.max(0.0).sqrt();
-            let more = self.by_lean(&at(&(&belief.mean + &step)), reading);
-            let less = self.by_lean(&at(&(&belief.mean - &step)), reading);
-            moved.push(combined(&[more, less], &[0.5, -0.5]));
-        }
-        moved.push(combined(std::slice::from_ref(&change_us), &[FORM_SHARE]));
+        let read = [false, true].map(|is_level| {
+            let reading = Reading { is_level, slope_ratio };
+            let change_us = self.by_lean(&middle, reading);
+            let mut moved: Vec<Vec<Vec<f64>>> = Vec::new();
+            for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+                let step = vector * value.max(0.0).sqrt();
+                let more = self.by_lean(&at(&(&belief.mean + &step)), reading);
+                let less = self.by_lean(&at(&(&belief.mean - &step)), reading);
+                moved.push(combined(&[more, less], &[0.5, -0.5]));
+            }
+            moved.push(combined(std::slice::from_ref(&change_us), &[FORM_SHARE]));
+            (change_us, moved)
+        });
         let level = middle.lean.get(self.level_row()).cloned().unwrap_or_default();
         let wind = |step: usize| {
             let tangent = (step as f64 * LEAN_STEP_DEG).to_radians().tan();
@@ -230,15 +226,17 @@ impl WindForms {
             climb_mps.abs() <= USUAL_CLIMB_MPS
         };
         let usual_climbs: Vec<usize> = (0..climbs).filter(|climb| is_usual(*climb)).collect();
-        LeanTable {
+        let [(_, moved), _] = &read;
+        let weights = weights(moved, usual, &usual_climbs);
+        read.map(|(change_us, moved)| LeanTable {
             indicator: Indicator::Pulse,
             lean_step_deg: LEAN_STEP_DEG,
             first_climb_mps: self.first_climb_mps,
             climb_step_mps: self.climb_step_mps,
             change_us,
-            wind_mps,
-            doubts_us: directions(&moved, usual, &usual_climbs),
-        }
+            wind_mps: wind_mps.clone(),
+            doubts_us: directions(&moved, &weights),
+        })
     }
 }
 
@@ -253,13 +251,12 @@ fn combined(tables: &[Vec<Vec<f64>>], weights: &[f64]) -> Vec<Vec<f64>> {
     sum
 }
 
-/// Few directions that vary nearly as all of these do together where drones usually are; what they leave of a
-/// cell's variance widens them there.
-fn directions(
+/// What few directions take of each of these tables, to vary nearly as all of them do together where drones usually are.
+fn weights(
     moved: &[Vec<Vec<f64>>],
     usual_leans: usize,
     usual_climbs: &[usize],
-) -> Vec<Vec<Vec<f64>>> {
+) -> Vec<DVector<f64>> {
     let cell = |table: &[Vec<f64>], lean: usize, climb: usize| table[lean][climb];
     let product = |one: &[Vec<f64>], other: &[Vec<f64>]| -> f64 {
         (0..usual_leans)
@@ -272,11 +269,15 @@ fn directions(
     let eigen = SymmetricEigen::new(gram);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let mut found: Vec<Vec<Vec<f64>>> = order
-        .into_iter()
-        .take(DIRECTIONS)
-        .map(|index| combined(moved, eigen.eigenvectors.column(index).as_slice()))
-        .collect();
+    let first = order.into_iter().take(DIRECTIONS);
+    first.map(|index| eigen.eigenvectors.column(index).into_owned()).collect()
+}
+
+/// The directions with these weights; what they leave of a cell's variance widens them there.
+fn directions(moved: &[Vec<Vec<f64>>], weights: &[DVector<f64>]) -> Vec<Vec<Vec<f64>>> {
+    let cell = |table: &[Vec<f64>], lean: usize, climb: usize| table[lean][climb];
+    let mut found: Vec<Vec<Vec<f64>>> =
+        weights.iter().map(|weights| combined(moved, weights.as_slice())).collect();
     for lean in 0..found.first().map_or(0, Vec::len) {
         for climb in 0..found[0][lean].len() {
             let square = |of: &[Vec<Vec<f64>>]| -> f64 {
@@ -323,7 +324,7 @@ pub(super) mod tests {
     #[test]
     fn a_table_reads_the_wind_by_the_lean_and_its_doubts_grow_with_the_wind() {
         let forms = forms();
-        let table = forms.table(&forms.prior(), Reading::default());
+        let [table, _] = forms.tables(&forms.prior(), 1.0);
         let lean_deg = |wind: f64| (0.02 * wind + 0.001 * wind * wind).atan().to_degrees();
         for wind in [1.0, 4.0, 8.0] {
             let read = table.wind_at(lean_deg(wind)).unwrap();
@@ -355,19 +356,21 @@ pub(super) mod tests {
             }
         }
         let lean_deg = (0.02 * 4.0 + 0.001 * 16.0_f64).atan().to_degrees();
-        let table = |reading| forms.table(&forms.prior(), reading);
-        let level = table(forms.reading(None, true));
+        let [of_moment, level] = forms.tables(&forms.prior(), 1.0);
         let change_us = |table: &LeanTable, climb_mps: f64| table.at(lean_deg, climb_mps);
         assert!((change_us(&level, 1.0) + 0.75 * 8.0).abs() < 0.1, "{}", change_us(&level, 1.0));
-        let of_moment = table(forms.reading(None, false));
         assert!(change_us(&of_moment, 1.0) > change_us(&level, 1.0) + 0.3, "a lesser wind");
         assert_eq!(change_us(&of_moment, 0.0), change_us(&level, 0.0));
-        let steep = table(forms.reading(Some(26.0 * 1.2), true));
+        let [_, steep] = forms.tables(&forms.prior(), forms.slope_ratio(26.0 * 1.2));
         assert!((change_us(&steep, 0.0) - change_us(&level, 0.0)).abs() < 1e-12);
         let gained = |table: &LeanTable| change_us(table, 1.0) - change_us(table, -1.0);
         assert!((gained(&steep) - 1.2 * gained(&level)).abs() < 1e-9);
-        assert_eq!(forms.reading(Some(1e9), true).slope_ratio, MOST_RATIO);
-        assert_eq!(forms.reading(Some(f64::NAN), true).slope_ratio, 1.0);
+        // One direction of the doubts in both, of the same sign.
+        let doubts = |table: &LeanTable| table.doubts_at(lean_deg, 0.0).unwrap();
+        assert_eq!(doubts(&of_moment), doubts(&level));
+        for slope in [1e9, -26.0, 0.0, f64::NAN] {
+            assert_eq!(forms.slope_ratio(slope), 1.0, "{slope}");
+        }
     }
 
     #[test]
@@ -375,7 +378,7 @@ pub(super) mod tests {
         let forms = forms();
         let known = Belief { mean: DVector::from_vec(vec![0.0, 1.0]), ..forms.prior() };
         let known = Belief { covariance: known.covariance * 1e-6, ..known };
-        let table = forms.table(&known, Reading::default());
+        let [table, _] = forms.tables(&known, 1.0);
         let lean_deg = 0.224_f64.atan().to_degrees();
         assert!((table.at(lean_deg, 0.0) + 0.6 * 64.0).abs() < 0.3);
         let doubts = table.doubts_at(lean_deg, 0.0).unwrap();

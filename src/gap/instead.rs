@@ -308,7 +308,8 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     }
     let is_alone = names.len() == 1;
     if let Some((still_nats, _)) = still {
-        names.extend(beside_alone(&names, &others, most, still_nats));
+        let all = others.iter().chain(is_single.then_some(&there));
+        names.extend(beside_alone(&names, all, most, still_nats));
     }
     let ended = if is_instead { others.swap_remove(0) } else { there };
     // Elsewhere the model itself explains nearly as much: what the updraft then leaves of the climb is in doubt.
@@ -324,16 +325,21 @@ fn decided(there: Ended, mut others: Vec<Ended>) -> Decided {
     Decided { ended, names }
 }
 
-/// Other effects of the climb that nearly explain the flight as well as one that would be named alone; `most` is how well
-/// that one does, and `still` how well nothing does, nats.
-fn beside_alone(names: &[String], others: &[Ended], most: f64, still: f64) -> Vec<String> {
+/// Other effects of the climb that nearly explain the flight as well as the only one that would be named; `most` is how well
+/// the best of all does, and `still` how well nothing does, nats.
+fn beside_alone<'a>(
+    names: &[String],
+    others: impl Iterator<Item = &'a Ended>,
+    most: f64,
+    still: f64,
+) -> Vec<String> {
     let mut effects = names.iter().filter(|name| find(name).is_some());
     let (Some(alone), None) = (effects.next(), effects.next()) else { return Vec::new() };
     if !depends_on_climb(alone) {
         return Vec::new();
     }
     let least = (most - NOISE_NATS).max(still + NOISE_SHARE * (most - still));
-    let near = others.iter().filter(|other| other.nats > least);
+    let near = others.filter(|other| other.nats > least);
     let mut found: Vec<String> = Vec::new();
     for name in near.flat_map(|other| leads(&other.found)) {
         if name != *alone && depends_on_climb(&name) && !found.contains(&name) {
@@ -451,6 +457,9 @@ mod tests {
         assert_eq!(class, ["response-drift/vortex-ring"], "in doubt already");
         let of_time = told(ended(0.0, &["motor-thermal"]), others());
         assert_eq!(of_time, ["motor-thermal"]);
+        let beaten = vec![ended(20.0, &["face-drag"]), ended(-110.0, &[])];
+        let told = told(ended(0.0, &["response-drift"]), beaten);
+        assert_eq!(told, ["face-drag/response-drift"], "who was found first and is beaten");
     }
 
     #[test]

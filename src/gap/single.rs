@@ -173,7 +173,7 @@ fn at_their_bounds(found: &mut Found) {
 }
 
 /// Names beside something unknown that may be the same: what was found together with it, and what depends on the same
-/// and explains hardly more; a step in time sets the climbs that were flown before it against those after it. An effect that the model has, found after it with another size, may be what the free shape leaves of
+/// and explains a seventh as much; a step in time sets the climbs that were flown before it against those after it. An effect that the model has, found after it with another size, may be what the free shape leaves of
 /// the unknown.
 fn beside_something_unknown(steps: &mut [Step]) {
     let unknown: Vec<(usize, Dependence, f64)> = steps
@@ -236,7 +236,7 @@ fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     }
 }
 
-/// Names beside an effect that is left, new or with another size than the model's.
+/// Names, of new effects and of other sizes than the model's, beside an effect that is left.
 fn beside_an_effect_that_is_left(steps: &mut [Step], rest: &Rest) {
     for step in steps {
         let Some(effect) = lone_name(step) else { continue };
@@ -297,14 +297,14 @@ fn beside_a_class(steps: &mut [Step]) {
     }
 }
 
-/// Names of what depends on the same as a class that leans tell: which drag it is decides the wind that the pulse is held
-/// against.
+/// Names of what depends on the wind, beside a class that leans tell: which drag it is decides the wind that the pulse is held
+/// against. They are told with the first of the drags.
 pub(super) fn beside_what_leans_tell(steps: &mut [Step], leans: Option<&Step>) {
     let Some(Finding::Class { effects, .. }) = leans.map(|step| &step.finding) else { return };
     for step in steps {
         let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
-        let first = effects.first();
-        let other = first.filter(|first| **first != effect && depend_on_the_same(first, &effect));
+        let is_of_wind = Dependence::Wind.may_show(&effect);
+        let other = effects.first().filter(|first| **first != effect && is_of_wind);
         doubt(step, other.cloned());
     }
 }
@@ -488,7 +488,11 @@ mod tests {
         let drags = ["blade-flapping", "momentum-drag"];
         assert_eq!(beside("translational-lift", &drags), "translational-lift blade-flapping");
         assert_eq!(beside("translational-lift", &drags[..1]), "translational-lift", "a name");
-        assert_eq!(beside("battery", &drags), "battery", "it depends on something else");
+        let bodies = ["parasitic-drag", "face-drag"];
+        assert_eq!(beside("translational-lift", &bodies), "translational-lift parasitic-drag");
+        for effect in ["battery", "thrust-curve"] {
+            assert_eq!(beside(effect, &bodies), effect, "it does not depend on the wind");
+        }
         let mut steps = vec![step(name("translational-lift"), 38.0, 20.0, &[])];
         beside_what_leans_tell(&mut steps, None);
         assert_eq!(told(&steps).concat(), "translational-lift");

@@ -2,7 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "this is test code")]
 
+use std::collections::BTreeMap;
+
+use updraft::analysis::TruthSeries;
 use updraft::analysis::budget::TruthCheck;
+use updraft::analysis::result::UpdraftMap;
 use updraft::blind::worlds::maps;
 use updraft::campaign;
 use updraft::mission::resolve::Override;
@@ -11,8 +15,17 @@ use updraft::workflow::find::{Work, find};
 use updraft::workflow::host::Quiet;
 use updraft::workflow::{mission, plan};
 
+/// The true air over each slot, by second.
+type Truth = BTreeMap<u16, TruthSeries>;
+
 /// What one campaign of `side` by `side` drones gave: the map by each second alone, and the posterior.
 fn flown(template: &str, side: i64, own: Override, kind: &str, seed: u64) -> [TruthCheck; 2] {
+    let (map, _) = mapped(template, side, own, kind, seed);
+    [map.truth.unwrap(), map.posterior.unwrap().truth.unwrap()]
+}
+
+/// The map of one campaign of `side` by `side` drones, and the true air.
+fn mapped(template: &str, side: i64, own: Override, kind: &str, seed: u64) -> (UpdraftMap, Truth) {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join(kind);
     let overrides = [
@@ -29,13 +42,32 @@ fn flown(template: &str, side: i64, own: Override, kind: &str, seed: u64) -> [Tr
     let mut work = Work::new(&root);
     find(&root, None, &mut work).unwrap();
     let hover = work.flights.last_mut().unwrap();
-    hover.truth = truth.updraft;
+    hover.truth.clone_from(&truth.updraft);
     hover.true_air = Some(truth.air);
     let settings = Settings::default();
     let analysing = Analysing::begin(&host, &work, &settings, None).unwrap();
     let analysed = analysing.run(false).unwrap();
     let map = analysed.analysis.flights.last().unwrap().map.clone().unwrap();
-    [map.truth.unwrap(), map.posterior.unwrap().truth.unwrap()]
+    (map, truth.updraft)
+}
+
+/// Slope of the values of each second against the true air.
+fn slope(map: &UpdraftMap, truth: &Truth) -> f64 {
+    let of_drone = |slot: Option<u16>, values: &[Option<f64>]| -> Vec<[f64; 2]> {
+        let Some(truth) = slot.and_then(|slot| truth.get(&slot)) else { return Vec::new() };
+        let of = |(time_s, value): (&f64, &Option<f64>)| {
+            Some([truth.at_second(*time_s as i64)?, (*value)?])
+        };
+        map.time_s.iter().zip(values).filter_map(of).collect()
+    };
+    let all: Vec<[f64; 2]> =
+        map.drones.iter().flat_map(|drone| of_drone(drone.slot, &drone.updraft_mps)).collect();
+    let mean = |axis: usize| all.iter().map(|one| one[axis]).sum::<f64>() / all.len() as f64;
+    let middle = [mean(0), mean(1)];
+    let product = |axis: usize| -> f64 {
+        all.iter().map(|one| (one[0] - middle[0]) * (one[axis] - middle[axis])).sum()
+    };
+    product(1) / product(0)
 }
 
 #[test]
@@ -103,10 +135,11 @@ fn a_scan_of_a_vehicle_that_leans_less_than_its_file_says_is_near_the_truth() {
 }
 
 #[test]
-fn along_legs_rising_air_is_neither_too_strong_nor_another_wind() {
+fn along_legs_rising_air_is_no_stronger_than_it_is() {
     let passes = Override::new("scan.passes", 1);
-    let [plain, posterior] = flown("scan-campaign", 4, passes, "thermal", 7003);
-    println!("each second alone {plain:?}, posterior {posterior:?}");
-    assert!(posterior.rms_without_bias_mps < 0.11, "{posterior:?}");
-    assert!(posterior.inside_share.unwrap() > 0.9, "{posterior:?}");
+    let (map, truth) = mapped("scan-campaign", 4, passes, "thermal", 7003);
+    let slope = slope(&map, &truth);
+    println!("slope {slope:.3}, {:?}", map.truth);
+    // With leans that are wind alone, and what wind adds to the slope as the file has it, it is 1.14.
+    assert!((0.96..1.08).contains(&slope), "{slope}");
 }

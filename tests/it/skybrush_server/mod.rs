@@ -35,8 +35,13 @@ fn run(bench: &Bench, server: &Fake, args: &[&str]) -> Ended {
     command.args(["--connect", &format!("skybrush://{}", server.address)]);
     command.args(server.clock.args());
     let ended = Ended::of(&command.stdin(Stdio::null()).output().unwrap());
+    // Its digits alone may be those of a distance.
     let address = server.address.to_string();
-    let tidy = |text: &str| without_time_left(&text.replace(&address, "127.0.0.1:PORT"));
+    let port = format!("port {}", server.address.port());
+    let tidy = |text: &str| {
+        let text = text.replace(&address, "127.0.0.1:PORT").replace(&port, "port PORT");
+        without_time_left(&text)
+    };
     Ended { err: tidy(&ended.err), out: tidy(&ended.out), ..ended }
 }
 
