@@ -6,10 +6,9 @@
 //!
 //! In the frame of the air, flying at 4 m/s through still air and standing in a wind of 4 m/s are the
 //! same: what drag and translational lift do to the pulse follows from the lean in both, and the
-//! corrections for a hover in wind ([`super::corrections`]) hold for a leg, but that its lean is known to be the wind's, less what
-//! rising air does to it ([`super::track_lean`]). What differs besides is
-//! that a mean over 10 s is one over 10 s of the way, and that a change of speed leans a drone too:
-//! seconds with one have no value.
+//! corrections for a hover in wind ([`super::corrections`]) hold for a leg, once what rising air does to its lean is
+//! taken away ([`super::track_lean`]). What differs besides is that a mean over 10 s is one over 10 s of the way, and
+//! that a change of speed leans a drone too: seconds with one have no value.
 
 use nalgebra::Vector3;
 

@@ -173,8 +173,8 @@ fn at_their_bounds(found: &mut Found) {
 }
 
 /// Names beside something unknown that may be the same: what was found together with it, and what depends on the same
-/// and explains a seventh as much; a step in time sets the climbs that were flown before it against those after it. An effect that the model has, found after it with another size, may be what the free shape leaves of
-/// the unknown.
+/// and explains a seventh as much; a step in time sets the climbs that were flown before it against those after it. An effect that
+/// the model has, found after it with another size, may be what the free shape leaves of the unknown.
 fn beside_something_unknown(steps: &mut [Step]) {
     let unknown: Vec<(usize, Dependence, f64)> = steps
         .iter()
