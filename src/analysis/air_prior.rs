@@ -151,8 +151,21 @@ impl Record {
         for doubt in &self.doubts_us {
             covariance += doubt * doubt.transpose();
         }
-        let log_likelihood = self.solve(covariance)?.log_likelihood;
-        Some(Gls { log_likelihood, ..fit })
+        Some(Gls { log_likelihood: self.log_likelihood(covariance)?, ..fit })
+    }
+
+    /// That of [`Self::solve`] alone.
+    fn log_likelihood(&self, covariance: DMatrix<f64>) -> Option<f64> {
+        let factor: Cholesky<f64, Dyn> = covariance.cholesky()?;
+        let (mut design, mut pulse_us) = (self.design.clone(), self.pulse_us.clone());
+        factor.l_dirty().solve_lower_triangular_mut(&mut design);
+        factor.l_dirty().solve_lower_triangular_mut(&mut pulse_us);
+        let normal = design.tr_mul(&design).cholesky()?;
+        let mut explained = design.tr_mul(&pulse_us);
+        normal.l_dirty().solve_lower_triangular_mut(&mut explained);
+        let chi2 = pulse_us.norm_squared() - explained.norm_squared();
+        let log_likelihood = -0.5 * (log_determinant(&factor) + log_determinant(&normal) + chi2);
+        log_likelihood.is_finite().then_some(log_likelihood)
     }
 
     fn solve(&self, covariance: DMatrix<f64>) -> Option<Gls> {
@@ -162,13 +175,14 @@ impl Record {
         let gain = normal.solve(&whitened.transpose());
         let residual = &self.pulse_us - &self.design * (&gain * &self.pulse_us);
         let chi2 = residual.dot(&factor.solve(&residual));
-        let log_determinant = |factor: &Cholesky<f64, Dyn>| {
-            2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
-        };
         let log_likelihood = -0.5 * (log_determinant(&factor) + log_determinant(&normal) + chi2);
         let covariance = normal.inverse();
         log_likelihood.is_finite().then_some(Gls { gain, covariance, log_likelihood })
     }
+}
+
+fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
 }
 
 /// One choice with its weight.

@@ -23,7 +23,7 @@ use super::law::{LawKind, LawOf, Symbol};
 use super::laws_of_others;
 use super::lean_table::LeanTable;
 use super::levelled;
-use super::map_statistics::{HoverSeen, of_map};
+use super::map_statistics::{HoverSeen, Observed, wind_of};
 use super::measured::Measured;
 use super::options::AnalysisOptions;
 use super::posterior;
@@ -392,11 +392,13 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
     if let Some(map) = &mut map {
         Beside::add(map, seen.iter().map(|seen| &seen.beside));
     }
-    let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
+    let still = map.as_ref().filter(|map| !map.is_scan());
+    let wind = still.and_then(|map| lean_wind(shared, map, &seen));
+    let observed = still.map(|map| Observed::of(map, &seen));
     let places = map.as_ref().map(Places::of);
-    let wind = statistics.as_ref().and_then(|found| found.wind.as_ref());
-    // Neither needs the other's result, and both take seconds where many drones hover for long.
-    let ((), turbulence) = rayon::join(
+    let wind = wind.as_ref();
+    // None needs another's result, and all take seconds where many drones hover for long.
+    let ((), (turbulence, statistics)) = rayon::join(
         || {
             if let Some((map, modelled)) = map.as_mut().zip(modelled).filter(|_| options.posterior)
             {
@@ -404,7 +406,12 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> 
                 widened::widen(map);
             }
         },
-        || places.and_then(|places| turbulence_of(shared, (&places, &seen), wind)),
+        || {
+            rayon::join(
+                || places.and_then(|places| turbulence_of(shared, (&places, &seen), wind)),
+                || observed.map(|observed| statistics(shared, &observed, wind)),
+            )
+        },
     );
     let wind_legs = input.plan.and_then(|plan| WindLegs::of(plan, &drones));
     FlightAnalysis {
@@ -589,20 +596,24 @@ fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
     warnings
 }
 
-/// Statistics of the air over a map; `None` where drones moved.
+/// The wind by the leans over a map of drones that hover.
+fn lean_wind(shared: &Shared<'_>, map: &UpdraftMap, seen: &[HoverSeen]) -> Option<TiltWind> {
+    // The wind by which a response was steepened is that of its own leans.
+    let leans = shared.input.level.and_then(|level| level.response.as_ref()?.leans());
+    let drag = leans.as_ref().map_or_else(|| shared.drag(), LeanDrag::Table);
+    wind_of(map, seen, drag)
+}
+
+/// Statistics of the air over a map.
 fn statistics(
     shared: &Shared<'_>,
-    map: &UpdraftMap,
-    seen: &[HoverSeen],
-) -> Option<FieldStatistics> {
-    let Shared { input, options, .. } = shared;
-    // The wind by which a response was steepened is that of its own leans.
-    let leans = input.level.and_then(|level| level.response.as_ref()?.leans());
-    let drag = leans.as_ref().map_or_else(|| shared.drag(), LeanDrag::Table);
-    (!map.is_scan()).then(|| FieldStatistics {
-        true_air: input.true_air.cloned(),
-        ..of_map(map, seen, &options.statistics, drag)
-    })
+    observed: &Observed,
+    wind: Option<&TiltWind>,
+) -> FieldStatistics {
+    FieldStatistics {
+        true_air: shared.input.true_air.cloned(),
+        ..observed.statistics(&shared.options.statistics, wind.cloned())
+    }
 }
 
 /// Drones of a map with their places.

@@ -10,6 +10,11 @@ use super::window::WindowStats;
 use crate::flight::Indicator;
 use crate::numeric::mean;
 
+/// Chords at most that the added variance is found by. Numerical: a few are needed.
+const MOST_CHORDS: usize = 60;
+/// It is known to this share of it. Numerical.
+const ADDED_SHARE: f64 = 1e-7;
+
 /// Statistic that represents the samples of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Location {
@@ -244,32 +249,47 @@ fn widened(points: &[LawPoint], added_us: f64) -> Vec<LawPoint> {
 /// Standard deviation to add to every point's error so that the better law's reduced chi² is 1
 /// (Paule and Mandel 1982); 0 when it is below 1 already, `None` without degrees of freedom.
 fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
-    // `None` where neither law has a chi².
-    let is_too_little = |added_us: f64| -> Option<bool> {
-        let points = widened(points, added_us);
+    // By how much the lesser reduced chi² exceeds 1, as a share of it: with the variance that is added it falls nearly along a
+    // line. `None` where neither law has a chi².
+    let excess = |added_us2: f64| -> Option<f64> {
+        let points = widened(points, added_us2.sqrt());
         let chi2 = |fit: Result<Fit, FitError>| fit.ok()?.chi2_reduced;
         let linear = chi2(law::linear(&points, ErrorScale::Unscaled));
-        if linear.is_some_and(|chi2| chi2 <= 1.0) {
-            return Some(false);
-        }
         let quadratic = chi2(law::signed_quadratic(&points, ErrorScale::Unscaled));
-        linear.into_iter().chain(quadratic).min_by(f64::total_cmp).map(|least| least > 1.0)
+        let least = linear.into_iter().chain(quadratic).min_by(f64::total_cmp)?;
+        Some(1.0 - 1.0 / least)
     };
-    if !is_too_little(0.0)? {
+    let mut low = (0.0, excess(0.0)?);
+    if low.1 <= 0.0 {
         return Some(0.0);
     }
-    let (mut low, mut high) = (0.0, 1.0);
-    while is_too_little(high)? {
-        (low, high) = (high, high * 2.0);
-        if high > 1e4 {
+    let mut high_us = 1.0_f64;
+    let mut high = (high_us.powi(2), excess(high_us.powi(2))?);
+    while high.1 > 0.0 {
+        high_us *= 2.0;
+        if high_us > 1e4 {
             return None;
         }
+        low = std::mem::replace(&mut high, (high_us.powi(2), excess(high_us.powi(2))?));
     }
-    for _ in 0..24 {
-        let middle = f64::midpoint(low, high);
-        if is_too_little(middle)? { low = middle } else { high = middle }
+    // The chord, with the value at an end that stays halved (Dowell and Jarratt 1971).
+    let mut at = high.0;
+    for _ in 0..MOST_CHORDS {
+        let before = at;
+        at = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let found = excess(at)?;
+        if (at - before).abs() <= ADDED_SHARE * at || found == 0.0 {
+            break;
+        }
+        if found > 0.0 {
+            low = (at, found);
+            high.1 *= 0.5;
+        } else {
+            high = (at, found);
+            low.1 *= 0.5;
+        }
     }
-    Some(high)
+    Some(at.sqrt())
 }
 
 /// The paper's flock mapping: windows averaged over drones with equal weights, then fitted.

@@ -25,6 +25,9 @@ const W_STEP_MPS: f64 = 0.05;
 /// Rounds of the effective variance (York; docs/physics.md, 5.2). Numerical.
 const VARIANCE_ROUNDS: usize = 3;
 
+/// Squared spread of a regressor below which all its values are equal: (1e-6)². Numerical.
+const LEAST_SPREAD: f64 = 1e-12;
+
 /// A law from fewer windows is warned about: two more than a line has parameters.
 const FEWEST_WINDOWS: usize = 4;
 
@@ -293,8 +296,7 @@ fn weighted_line(
     let line = Line::weighted(
         weighed.map(|(point, sigma)| (x(point), point.pulse_us, 1.0 / (sigma * sigma))),
     )?;
-    // Squared spread of x below (1e-6)²: all velocities equal.
-    (line.xx > line.weight * 1e-12).then(|| (line.slope(), line.intercept()))
+    (line.xx > line.weight * LEAST_SPREAD).then(|| (line.slope(), line.intercept()))
 }
 
 fn grid() -> impl Iterator<Item = f64> {
@@ -323,14 +325,61 @@ fn law_of(solution: &Solution) -> Law {
     Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps: p[2] }
 }
 
+/// Points for a search over W, in which A and u0 follow in closed form.
+struct Profile {
+    /// Velocity, m/s, weight, and pulse from the mean on, us, of each point.
+    points: Vec<[f64; 3]>,
+    weight: f64,
+    mean_us: f64,
+    /// Sum of the squares of the pulses.
+    yy: f64,
+}
+
+impl Profile {
+    fn of(points: &[LawPoint], sigmas: &[f64]) -> Self {
+        let weighted = || points.iter().zip(sigmas.iter().map(|sigma| 1.0 / (sigma * sigma)));
+        let weight: f64 = weighted().map(|(_, weight)| weight).sum();
+        let sum_us: f64 = weighted().map(|(point, weight)| weight * point.pulse_us).sum();
+        let mean_us = sum_us / weight;
+        let points: Vec<[f64; 3]> = weighted()
+            .map(|(point, weight)| [point.velocity_mps, weight, point.pulse_us - mean_us])
+            .collect();
+        let yy = points.iter().map(|[_, weight, y]| weight * y * y).sum();
+        Self { points, weight, mean_us, yy }
+    }
+
+    /// The least chi² at a W with A, u0 and W; `None` where all points have one speed through the air.
+    fn at(&self, w_mps: f64) -> Option<(f64, [f64; 3])> {
+        let (mut sum, mut square, mut xy) = (0.0, 0.0, 0.0);
+        for [velocity_mps, weight, y] in &self.points {
+            let x = signed_square(velocity_mps - w_mps);
+            let weighted = weight * x;
+            sum += weighted;
+            square += weighted * x;
+            xy += weighted * y;
+        }
+        let mean = sum / self.weight;
+        let xx = square - sum * mean;
+        let slope = xy / xx;
+        let chi2 = (self.yy - slope * xy).max(0.0);
+        (xx > self.weight * LEAST_SPREAD)
+            .then_some((chi2, [slope, self.mean_us - slope * mean, w_mps]))
+    }
+}
+
+/// Where the parabola through a minimum of the grid and its neighbours is least: a start from which few steps are left.
+fn bottom(w_mps: f64, at: impl Fn(f64) -> Option<(f64, [f64; 3])>) -> f64 {
+    let chi2 = [-W_STEP_MPS, 0.0, W_STEP_MPS].map(|step| at(w_mps + step).map(|(chi2, _)| chi2));
+    let [Some(below), Some(here), Some(above)] = chi2 else { return w_mps };
+    let curvature = below - 2.0 * here + above;
+    let shift = 0.5 * (below - above) / curvature;
+    if shift.abs() <= 1.0 { w_mps + W_STEP_MPS * shift } else { w_mps }
+}
+
 /// Profiles chi² over W and polishes every local minimum with a positive A.
 fn all_minima(points: &[LawPoint], sigmas: &[f64]) -> Result<Minima, FitError> {
-    let at = |w_mps: f64| {
-        let regressor = |point: &LawPoint| signed_square(point.velocity_mps - w_mps);
-        let (a, u0_us) = weighted_line(points, sigmas, regressor)?;
-        let law = Law::SignedQuadratic { a, u0_us, w_mps };
-        Some((chi2(points, sigmas, law), [a, u0_us, w_mps]))
-    };
+    let profile = Profile::of(points, sigmas);
+    let at = |w_mps: f64| profile.at(w_mps);
     let profiled: Vec<_> = grid().map(at).collect();
     let chi2: Vec<f64> =
         profiled.iter().map(|entry| entry.map_or(f64::INFINITY, |(chi2, _)| chi2)).collect();
@@ -346,6 +395,7 @@ fn all_minima(points: &[LawPoint], sigmas: &[f64]) -> Result<Minima, FitError> {
         minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
     };
     let mut minima: Vec<Solution> = minima_of(&chi2)
+        .map(|w_mps| bottom(w_mps, &at))
         .filter_map(at)
         .filter(|(_, start)| start[0] > 0.0)
         .filter_map(|(_, start)| polish(start).ok())

@@ -5,7 +5,7 @@ use super::result::{Fit, Laws, UpdraftMap};
 use super::running::RUNNING_S;
 use super::statistics::averaging::{Seconds, averaging};
 use super::statistics::baseline::baseline;
-use super::statistics::result::FieldStatistics;
+use super::statistics::result::{FieldStatistics, TiltWind};
 use super::statistics::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
 use super::statistics::{FieldInput, StatisticsOptions, field_statistics};
 use super::turbulence::Records;
@@ -119,44 +119,14 @@ fn heading_deg(flight: &Flight, hover: &Target) -> Option<f64> {
     known.then(|| f64::atan2(east, north).to_degrees().rem_euclid(360.0))
 }
 
-/// Statistics of a map and of what its logs showed, in the order of the map's drones.
-pub(super) fn of_map(
+/// The wind by the leans of a map's drones, of which `seen` is in the same order.
+pub(super) fn wind_of(
     map: &UpdraftMap,
     seen: &[HoverSeen],
-    options: &StatisticsOptions,
     drag: LeanDrag<'_>,
-) -> FieldStatistics {
-    let input = FieldInput {
-        places_m: map.drones.iter().map(|one| one.position_m.unwrap_or([f64::NAN; 2])).collect(),
-        values_mps: map.drones.iter().map(|one| one.updraft_mps.clone()).collect(),
-        running_s: RUNNING_S as usize,
-    };
-    let mut statistics = field_statistics(&input, options);
-    let drones = || map.drones.iter().zip(seen);
-    let levelled = map.levelled.as_ref().and_then(|levelled| levelled.drones.first());
-    let of_level = levelled.map(|drone| drone.slope);
-    match of_level.or_else(|| map.flock.as_ref().and_then(slope_us_per_mps)) {
-        Some(slope) => {
-            let corrected = map.common.is_some() && map.wind.is_some();
-            let fleet: Vec<Seconds> = drones()
-                .map(|(drone, seen)| Seconds {
-                    slot: drone.slot,
-                    name: drone.name.clone(),
-                    values_mps: seen.values_mps(slope, &map.time_s, &drone.updraft_mps, corrected),
-                })
-                .collect();
-            statistics.baseline = baseline(&fleet);
-            match averaging(&fleet) {
-                Ok(found) => statistics.averaging = Some(found),
-                Err(reason) => statistics.absent.push(reason),
-            }
-        }
-        None => statistics.absent.push(
-            "no averaging times: there is no law of the flock to turn pulses into speeds"
-                .to_owned(),
-        ),
-    }
-    let leans: Vec<MeanLean> = drones()
+) -> Option<TiltWind> {
+    let drones = map.drones.iter().zip(seen);
+    let leans: Vec<MeanLean> = drones
         .map(|(drone, seen)| MeanLean {
             slot: drone.slot,
             name: drone.name.clone(),
@@ -165,8 +135,68 @@ pub(super) fn of_map(
             heading_deg: seen.heading_deg,
         })
         .collect();
-    statistics.wind = tilt_wind(&leans, drag);
-    statistics
+    tilt_wind(&leans, drag)
+}
+
+/// All of a map and of what its logs showed that its statistics are of.
+pub(super) struct Observed {
+    field: FieldInput,
+    /// Single seconds of each drone; `None` without a law of the flock.
+    seconds: Option<Vec<Seconds>>,
+}
+
+impl Observed {
+    /// `seen` is in the order of the map's drones.
+    pub(super) fn of(map: &UpdraftMap, seen: &[HoverSeen]) -> Self {
+        let drones = || map.drones.iter();
+        let levelled = map.levelled.as_ref().and_then(|levelled| levelled.drones.first());
+        let slope = levelled
+            .map(|drone| drone.slope)
+            .or_else(|| map.flock.as_ref().and_then(slope_us_per_mps));
+        let corrected = map.common.is_some() && map.wind.is_some();
+        let seconds = |slope: f64| -> Vec<Seconds> {
+            drones()
+                .zip(seen)
+                .map(|(drone, seen)| Seconds {
+                    slot: drone.slot,
+                    name: drone.name.clone(),
+                    values_mps: seen.values_mps(slope, &map.time_s, &drone.updraft_mps, corrected),
+                })
+                .collect()
+        };
+        Self {
+            field: FieldInput {
+                places_m: drones().map(|one| one.position_m.unwrap_or([f64::NAN; 2])).collect(),
+                values_mps: drones().map(|one| one.updraft_mps.clone()).collect(),
+                running_s: RUNNING_S as usize,
+            },
+            seconds: slope.map(seconds),
+        }
+    }
+
+    /// Statistics of the air.
+    pub(super) fn statistics(
+        &self,
+        options: &StatisticsOptions,
+        wind: Option<TiltWind>,
+    ) -> FieldStatistics {
+        let mut statistics = field_statistics(&self.field, options);
+        match &self.seconds {
+            Some(fleet) => {
+                statistics.baseline = baseline(fleet);
+                match averaging(fleet) {
+                    Ok(found) => statistics.averaging = Some(found),
+                    Err(reason) => statistics.absent.push(reason),
+                }
+            }
+            None => statistics.absent.push(
+                "no averaging times: there is no law of the flock to turn pulses into speeds"
+                    .to_owned(),
+            ),
+        }
+        statistics.wind = wind;
+        statistics
+    }
 }
 
 /// Pulse per speed of the flock: of its line, else of its signed square up to 1 m/s, as the slope of

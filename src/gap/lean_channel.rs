@@ -142,6 +142,12 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
     })
 }
 
+/// The finding without a size: what the leans look like, which the model does not get.
+pub(super) fn not_taken_in(step: &Step) -> Step {
+    let effects = step.finding.effects().into_iter().map(str::to_owned).collect();
+    Step { finding: Finding::Class { effects, parameters: Vec::new() }, ..step.clone() }
+}
+
 /// What a vehicle leans by besides the drag of its rotors, rad/(m/s): the frame of ArduPilot's simulator has a drag of its own, and so
 /// has the momentum of the air that goes through rotors. A drag of the rotors that the leans tell comes on top of it.
 fn beside_rotor_drag(vehicle: &Vehicle, model_lean_per_mps: f64) -> f64 {

@@ -115,7 +115,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
     let before = Comparison::new(&data, vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
-    let leans = super::lean_channel::step(&before, &wind, options.alpha);
+    let mut leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(vehicle, &channel);
     if channel.named {
         // What is late may be the log alone: then the model must not be made late. So it is where no drone could have flown
@@ -129,10 +129,10 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
             repaired = vehicle.clone();
         }
     }
-    let answered = |repaired: &Vehicle| {
+    let answered = |repaired: &Vehicle, leans: &[Step]| {
         let mut repaired = repaired.clone();
-        add_others(&mut repaired, leans.as_slice());
-        add_bodies(&mut repaired, leans.as_slice());
+        add_others(&mut repaired, leans);
+        add_bodies(&mut repaired, leans);
         let question = Question {
             original: vehicle,
             repaired: &repaired,
@@ -143,16 +143,26 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         };
         question.answered(&train, &held)
     };
-    let (mut found, mut shrink) = match answered(&repaired) {
+    let (mut found, mut shrink) = match answered(&repaired, leans.as_slice()) {
         Err(error) if error.is_not_flown() && channel.named && !channel.in_log => {
             channel.in_log = true;
-            answered(vehicle)?
+            answered(vehicle, leans.as_slice())?
         }
         answered => answered?,
     };
     if is_only_in_log(&channel, &shrink) {
         channel.in_log = true;
-        (found, shrink) = answered(vehicle)?;
+        (found, shrink) = answered(vehicle, leans.as_slice())?;
+    }
+    if grows(&shrink)
+        && let Some(step) = &leans
+    {
+        // The drag that no lean tells from this one can change the pulse in another way: the model stays as it was.
+        let (without, gap) = answered(if channel.in_log { vehicle } else { &repaired }, &[])?;
+        if !grows(&gap) {
+            leans = Some(super::lean_channel::not_taken_in(step));
+            (found, shrink) = (without, gap);
+        }
     }
     if shrink.left_over().is_some() {
         super::single::beside_what_nothing_explains(&mut found.steps);

@@ -20,12 +20,14 @@
 //! ```
 
 mod banded;
+mod cholesky;
 mod line;
 mod minimise;
 mod moments;
 mod order;
 
 pub(crate) use banded::Banded;
+pub(crate) use cholesky::cholesky;
 pub use line::Line;
 pub(crate) use minimise::{
     Inverse, Least, differences, differences_at_once, minimise, minimise_known, minimise_roughly,

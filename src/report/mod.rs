@@ -93,6 +93,7 @@ pub use gap_terminal::gap_summary;
 pub use links::PageLink;
 pub use mast_page::render_mast;
 pub use mast_terminal::mast_summary;
+pub use page::Drawn;
 pub use sensitivity_page::render_sensitivity;
 pub use sensitivity_points::Points;
 pub use sensitivity_terminal::sensitivity_summary;
@@ -198,16 +199,9 @@ pub struct Beside<'a> {
     pub basemap: Option<&'a Basemap>,
 }
 
-/// Renders the report with what is at hand beside the analysis.
-///
-/// # Errors
-/// [`ReportError::Page`], a bug of this program.
-pub fn render_with(
-    analysis: &Analysis,
-    beside: Beside<'_>,
-    provenance: &Provenance,
-) -> Result<Report, ReportError> {
-    page::render(analysis, beside, provenance)
+/// Draws the sections of the report, with what there is beside the analysis.
+pub fn draw(analysis: &Analysis, beside: Beside<'_>) -> Drawn {
+    page::draw(analysis, beside, format::Format::default())
 }
 
 /// Renders the report with the paper's Fig. 2 and Table I from a finished simulation study.

@@ -2,6 +2,7 @@
 
 use minijinja::context;
 use minijinja::value::Value;
+use rayon::prelude::*;
 
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::study::result::StudyResult;
@@ -38,10 +39,7 @@ pub(super) fn render(
     beside: Beside<'_>,
     provenance: &Provenance,
 ) -> Result<Report, ReportError> {
-    let mut figures = Gallery::default();
-    let values = values(analysis, beside, provenance, &mut figures);
-    let html = fill("report.html", PAGE, values)?;
-    Ok(Report { html, figures: figures.files, data: figures.data })
+    draw(analysis, beside, Format::default()).page(analysis, provenance)
 }
 
 /// The figures of the report alone, drawn for a format.
@@ -51,54 +49,81 @@ pub(super) fn figures(
     beside: Beside<'_>,
     format: Format,
 ) -> Vec<(String, String)> {
-    let mut figures = Gallery::of(format);
-    values(analysis, beside, &Provenance::default(), &mut figures);
-    figures.files
+    draw(analysis, beside, format).figures.files
 }
 
-/// All that the page shows; the figures among it are put into `figures`, too.
-fn values(
-    analysis: &Analysis,
-    beside: Beside<'_>,
-    provenance: &Provenance,
-    figures: &mut Gallery,
-) -> Value {
+/// What takes long of a page and does not tell where its numbers come from: its sections with their figures.
+pub struct Drawn {
+    air: Vec<Value>,
+    laws: Option<Value>,
+    study: Option<Value>,
+    flights: Vec<Value>,
+    figures: Gallery,
+}
+
+/// Draws the sections of the page.
+pub(super) fn draw(analysis: &Analysis, beside: Beside<'_>, format: Format) -> Drawn {
     let Beside { study, basemap } = beside;
-    let air: Vec<Value> = analysis
-        .flights
-        .iter()
-        .enumerate()
-        .filter_map(|(index, flight)| air_section(analysis, flight, index, basemap, figures))
-        .collect();
+    let mut figures = Gallery { format, ..Gallery::default() };
+    let section = |make: &(dyn Fn(&mut Gallery) -> Option<Value> + Sync)| {
+        let mut own = Gallery { format, ..Gallery::default() };
+        (make(&mut own), own)
+    };
+    let numbered = || analysis.flights.par_iter().enumerate();
+    let (air, flights): (Vec<_>, Vec<_>) = rayon::join(
+        || {
+            let of = |(index, flight)| {
+                section(&|own| air_section(analysis, flight, index, basemap, own))
+            };
+            numbered().map(of).collect()
+        },
+        || {
+            let of = |(index, flight)| {
+                section(&|own| Some(flight_section(analysis, flight, index, own)))
+            };
+            numbered().map(of).collect()
+        },
+    );
+    let air: Vec<Value> = air.into_iter().filter_map(|made| figures.hang(made)).collect();
     let laws = figure_laws::figure(analysis, figures.format).map(|figure| figures.show(figure));
-    let study = study.map(|study| study_section(study, figures));
-    let flights: Vec<Value> = analysis
-        .flights
-        .iter()
-        .enumerate()
-        .map(|(index, flight)| flight_section(analysis, flight, index, figures))
-        .collect();
-    let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(&w.to_string())).collect();
-    let title = clean(&analysis.title);
-    let title = if title.trim().is_empty() { "Updraft report".to_owned() } else { title };
-    context! {
-        opening => Opening::of(analysis).value(),
-        cite => citation(analysis, &title, provenance),
-        title,
-        script => Value::from_safe_string(format!("\"use strict\";\n{}\n{}", plotter(), SCRIPTS.concat())),
-        style => Value::from_safe_string(format!("{STYLE}{EXPLORER_STYLE}{}", plotter_style())),
-        made_by => clean(&analysis.made_by),
-        schema => clean(&analysis.schema),
-        seed => provenance.seed.map(|seed| seed.to_string()),
-        made_at => clean(&provenance.made_at),
-        tiles => glance::tiles(analysis),
-        warnings_open => warnings.len() <= OPEN_LIMIT,
-        warnings,
-        air,
-        laws,
-        study,
-        flights,
-        ..common(provenance),
+    let study = study.map(|study| study_section(study, &mut figures));
+    let flights: Vec<Value> = flights.into_iter().filter_map(|made| figures.hang(made)).collect();
+    Drawn { air, laws, study, flights, figures }
+}
+
+impl Drawn {
+    /// The page of what was drawn of an analysis, with its files.
+    ///
+    /// # Errors
+    ///
+    /// [`ReportError::Page`], a bug of this program.
+    pub fn page(self, analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
+        let Self { air, laws, study, flights, figures } = self;
+        let warnings: Vec<String> =
+            analysis.warnings.iter().map(|w| clean(&w.to_string())).collect();
+        let title = clean(&analysis.title);
+        let title = if title.trim().is_empty() { "Updraft report".to_owned() } else { title };
+        let values = context! {
+            opening => Opening::of(analysis).value(),
+            cite => citation(analysis, &title, provenance),
+            title,
+            script => Value::from_safe_string(format!("\"use strict\";\n{}\n{}", plotter(), SCRIPTS.concat())),
+            style => Value::from_safe_string(format!("{STYLE}{EXPLORER_STYLE}{}", plotter_style())),
+            made_by => clean(&analysis.made_by),
+            schema => clean(&analysis.schema),
+            seed => provenance.seed.map(|seed| seed.to_string()),
+            made_at => clean(&provenance.made_at),
+            tiles => glance::tiles(analysis),
+            warnings_open => warnings.len() <= OPEN_LIMIT,
+            warnings,
+            air,
+            laws,
+            study,
+            flights,
+            ..common(provenance),
+        };
+        let html = fill("report.html", PAGE, values)?;
+        Ok(Report { html, figures: figures.files, data: figures.data })
     }
 }
 
@@ -117,6 +142,13 @@ impl Gallery {
     #[cfg(any(feature = "paper-figures", test))]
     pub(super) fn of(format: Format) -> Self {
         Self { format, ..Self::default() }
+    }
+
+    /// Keeps all files of a section that was made apart; the section.
+    fn hang<T>(&mut self, (section, own): (T, Self)) -> T {
+        self.files.extend(own.files);
+        self.data.extend(own.data);
+        section
     }
 
     /// Keeps the files of interactive parts; what their template gets.

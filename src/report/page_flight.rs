@@ -1,7 +1,7 @@
 //! The part of the page that tells of one flight: its tables, its fleet, its drones.
 
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, Write as _};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -216,11 +216,14 @@ fn compressed(drawings: &BTreeMap<String, String>) -> String {
     if drawings.is_empty() {
         return String::new();
     }
-    let mut packer = ZlibEncoder::new(Vec::new(), Compression::default());
-    let packed = serde_json::to_writer(&mut packer, drawings).map_err(io::Error::from);
-    packed
-        .and_then(|()| packer.finish())
-        .map_or_else(|_| String::new(), |bytes| STANDARD.encode(bytes))
+    // The packer clears what it has room for at each write, however short: it gets all at once.
+    let whole = serde_json::to_vec(drawings).map_err(io::Error::from);
+    let packed = whole.and_then(|whole| {
+        let mut packer = ZlibEncoder::new(Vec::new(), Compression::default());
+        packer.write_all(&whole)?;
+        packer.finish()
+    });
+    packed.map_or_else(|_| String::new(), |bytes| STANDARD.encode(bytes))
 }
 
 /// How many windows of each kind all drones have: `14 up × …` as words.

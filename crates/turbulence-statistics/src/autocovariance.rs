@@ -14,12 +14,31 @@ pub fn cross(a: &Record, b: &Record, lags: usize) -> Vec<f64> {
 /// Lags that are summed side by side.
 const LANES: usize = 8;
 
+/// Lags after which it is looked whether anything is left.
+const AT_ONCE: usize = 4 * LANES;
+
 /// Mean products of values with later ones, by lag; NaN where no pair is known.
 pub(crate) fn products(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
-    if a.len() == b.len() && a.iter().chain(b).all(|value| value.is_finite()) {
-        return (0..=lags).step_by(LANES).flat_map(|first| whole(a, b, first, lags)).collect();
+    products_from(a, b, 0, lags)
+}
+
+/// Mean products of values with later ones of the same record, by lag, until nothing is left, and some lags more, but for `lags`
+/// at most.
+pub(crate) fn products_until_lost(values: &[f64], lags: usize) -> Vec<f64> {
+    let mut found = Vec::new();
+    while found.len() <= lags && first_lost(&found).is_none() {
+        let first = found.len();
+        found.extend(products_from(values, values, first, lags.min(first + AT_ONCE - 1)));
     }
-    (0..=lags)
+    found
+}
+
+/// [`products`] from one of the lags on.
+fn products_from(a: &[f64], b: &[f64], first: usize, lags: usize) -> Vec<f64> {
+    if a.len() == b.len() && a.iter().chain(b).all(|value| value.is_finite()) {
+        return (first..=lags).step_by(LANES).flat_map(|first| whole(a, b, first, lags)).collect();
+    }
+    (first..=lags)
         .map(|lag| {
             let later = b.get(lag..).unwrap_or_default();
             let (mut sum, mut count) = (0.0, 0usize);
@@ -93,36 +112,48 @@ pub fn share_in_mean(time_s: f64, length_s: f64) -> f64 {
     2.0 * ratio * (1.0 - ratio * -(-1.0 / ratio).exp_m1())
 }
 
+/// The fastest exponential that is tried, steps of the record.
+const FASTEST_STEPS: f64 = 0.3;
+/// How much slower the next one is.
+const SLOWER: f64 = 1.03;
+/// At first only each so many-th is tried: what is left has one bottom. Numerical.
+const COARSE: usize = 8;
+
 impl Exponential {
     /// Fits lags from `from` on to the first at which nothing is left; `None` of what does not decay.
     pub fn fit(autocovariance: &[f64], step_s: f64, length_s: f64, from: usize) -> Option<Self> {
         let end = first_lost(autocovariance)?;
         // Beyond the first zero it is what one realisation happens to be.
         let used = autocovariance.get(from..end.max(from + 3)).filter(|used| used.len() >= 3)?;
-        let mut best: Option<(f64, Self)> = None;
+        let fastest_s = FASTEST_STEPS * step_s;
         let mut shape = Vec::with_capacity(used.len());
-        let mut time_s = 0.3 * step_s;
-        while time_s < length_s {
+        // What an exponential leaves unexplained, so many times slower than the fastest.
+        let mut at = |slower: usize| {
+            let time_s = fastest_s * SLOWER.powf(slower as f64);
             let share = share_in_mean(time_s, length_s);
+            let each_lag = (-step_s / time_s).exp();
+            let mut decayed = (-(from as f64) * step_s / time_s).exp();
             shape.clear();
-            shape.extend(
-                (from..from + used.len())
-                    .map(|lag| (-(lag as f64) * step_s / time_s).exp() - share),
-            );
             let (mut cross, mut square) = (0.0, 0.0);
-            for (shape, value) in shape.iter().zip(used) {
-                cross += shape * value;
-                square += shape.powi(2);
+            for value in used {
+                let at_lag = decayed - share;
+                shape.push(at_lag);
+                cross += at_lag * value;
+                square += at_lag.powi(2);
+                decayed *= each_lag;
             }
             let variance = cross / square;
             let each = shape.iter().zip(used);
             let left: f64 = each.map(|(shape, value)| (value - variance * shape).powi(2)).sum();
-            if variance > 0.0 && best.as_ref().is_none_or(|(least, _)| left < *least) {
-                best = Some((left, Self { variance, time_s, in_mean: share }));
-            }
-            time_s *= 1.03;
-        }
-        best.map(|(_, found)| found)
+            (variance > 0.0).then_some((left, slower, Self { variance, time_s, in_mean: share }))
+        };
+        let count = ((length_s / fastest_s).ln() / SLOWER.ln()).ceil().max(0.0) as usize;
+        let mut least_of = |steps: &mut dyn Iterator<Item = usize>| {
+            steps.filter_map(&mut at).min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let (_, near, _) = least_of(&mut (0..count).step_by(COARSE))?;
+        let around = near.saturating_sub(COARSE - 1)..count.min(near + COARSE);
+        least_of(&mut around.into_iter()).map(|(_, _, found)| found)
     }
 }
 
@@ -160,6 +191,28 @@ mod tests {
                 assert!(found.is_nan(), "{lag}");
             }
         }
+    }
+
+    #[test]
+    fn lags_until_nothing_is_left_are_the_first_of_all() {
+        let all = |values: &[f64]| products(values, values, values.len() / 4);
+        let is_first = |values: &[f64], most: usize| {
+            let (found, all) = (products_until_lost(values, values.len() / 4), all(values));
+            assert_eq!(found.len().div_ceil(AT_ONCE) * AT_ONCE, most, "{}", found.len());
+            let equal = |(one, other): (&f64, &f64)| one.to_bits() == other.to_bits();
+            assert!(found.iter().zip(&all).all(equal));
+            assert_eq!(first_lost(&found), first_lost(&all));
+        };
+        // A wave that is lost after a quarter of 28 steps, and one after 100; a gap; a slope that lasts.
+        let wave =
+            |steps: f64| move |place: usize| (place as f64 * std::f64::consts::TAU / steps).sin();
+        is_first(&(0..400).map(wave(28.0)).collect::<Vec<f64>>(), AT_ONCE);
+        is_first(&(0..400).map(wave(200.0)).collect::<Vec<f64>>(), 2 * AT_ONCE);
+        let mut gap: Vec<f64> = (0..400).map(wave(28.0)).collect();
+        gap[17] = f64::NAN;
+        is_first(&gap, AT_ONCE);
+        let slope: Vec<f64> = (0..400).map(|place| f64::from(place) - 200.0).collect();
+        is_first(&slope, 101_usize.next_multiple_of(AT_ONCE));
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Variances, covariances and skewness of records, with random and systematic errors.
 
 use crate::Record;
-use crate::autocovariance::{Exponential, first_lost, products, share_in_mean};
+use crate::autocovariance::{
+    Exponential, first_lost, products, products_until_lost, share_in_mean,
+};
 use crate::quantile::{WIDTH, of_variance, scaled};
 
 /// Lags that enter errors reach to this share of a record.
@@ -34,20 +36,29 @@ pub(crate) struct Known {
     /// NaN in gaps.
     anomalies: Vec<f64>,
     count: usize,
-    /// Autocovariance with noise, at the lags that enter errors.
+    /// Autocovariance with noise, at the lags that enter errors, or at the first of them until nothing is left.
     lags: Vec<f64>,
 }
 
 impl Known {
-    /// `None` of a record with too few values.
+    /// Of one record, whose moments need no lags beyond the first at which nothing is left. `None` with too few values.
     pub(crate) fn of(record: &Record) -> Option<Self> {
+        Self::with_lags(record, products_until_lost)
+    }
+
+    /// Of one of several records, which have something in common beyond that, too.
+    fn of_several(record: &Record) -> Option<Self> {
+        Self::with_lags(record, |anomalies, most| products(anomalies, anomalies, most))
+    }
+
+    fn with_lags(record: &Record, lags: impl Fn(&[f64], usize) -> Vec<f64>) -> Option<Self> {
         let count = record.count();
         if count < FEWEST {
             return None;
         }
         let anomalies = record.anomalies().values().to_vec();
         let most = (LAGS_SHARE * record.len() as f64) as usize;
-        let lags = products(&anomalies, &anomalies, most);
+        let lags = lags(&anomalies, most);
         Some(Self { step_s: record.step_s(), anomalies, count, lags })
     }
 
@@ -180,7 +191,7 @@ pub fn mean_variance(records: &[&Record], noise: &[f64], scale_se: f64) -> Optio
         .iter()
         .zip(noise)
         .filter_map(|(record, noise)| {
-            let known = Known::of(record)?;
+            let known = Known::of_several(record)?;
             let moment = known.variance(*noise, 0.0);
             Some((known, moment))
         })

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use super::covariance::Covariance;
 use super::data::{COMMON, Row, Rows};
 use super::vecchia::{Common, CommonVector, Parts, System};
+use crate::numeric::cholesky;
 
 /// The golden ratio's part after the point: multiples of it fill the unit interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -20,7 +21,7 @@ pub(super) fn factor(rows: &[Row], covariance: &Covariance) -> Option<DMatrix<f6
         }
         matrix[(column, column)] += one.noise_mps * one.noise_mps;
     }
-    Some(matrix.cholesky()?.unpack())
+    Some(cholesky(matrix)?.unpack())
 }
 
 /// Some of the values of a record.

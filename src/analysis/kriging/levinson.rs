@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DMatrixView};
 
 use super::covariance::{Air, Covariance, slow_by_time};
 use super::data::{COMMON, Drone, Rows};
-use super::vecchia::{Common, CommonVector, Parts, System};
+use super::vecchia::{Parts, System};
 
 /// Drones and floating-point operations of one likelihood at most, roughly: the cost grows with the third power of the drones
 /// and the square of the steps that predict.
@@ -205,43 +205,92 @@ impl Blocks {
     /// where rounding leaves no positive definite covariance.
     pub(super) fn system(&self, covariance: &Covariance, own_mps: &[f64]) -> Option<System> {
         let n = self.drones.len();
-        let order = self.order;
         let lagged = self.lagged(covariance);
-        let mut predictor = Predictor::new(lagged, n, covariance.is_reversible());
+        let mut predictor = Predictor::new(lagged, n, covariance.is_reversible())?;
         let mut parts = Parts::new(n);
-        let mut square = DMatrix::zeros(n, n);
+        // What is left of the values, and of each common error, white: step below step.
+        let mut white = DMatrix::zeros(self.steps * n, 1 + COMMON);
+        // Products of the constants with all these.
+        let mut own = DMatrix::zeros(n, 1 + COMMON);
         let mut left = DMatrix::zeros(n, self.records.ncols());
-        let mut common = DMatrix::zeros(n, COMMON);
-        for step in 0..self.steps {
-            if step <= order {
-                if step > 0 {
-                    predictor.extend()?;
-                }
-                let white = predictor.factor()?.solve_lower_triangular(&predictor.of_constants)?;
-                square = white.tr_mul(&white);
-                common.gemm(1.0, &white, &self.steady, 0.0);
-                predictor.white_constants = white;
+        for step in 0..=self.order {
+            if step > 0 {
+                predictor.extend()?;
             }
             let block = self.steps - 1 - step;
             left.copy_from(&self.records.rows(block * n, n));
             let before = self.records.rows((block + 1) * n, predictor.order * n);
             left.gemm(-1.0, &predictor.ahead(), &before, 1.0);
-            predictor.factor()?.solve_lower_triangular_mut(&mut left);
-            let value = left.column(0);
-            for (index, column) in self.varying.iter().enumerate() {
-                common.set_column(*column, &left.column(1 + index));
+            let left = &predictor.whitening * &left;
+            let constants = &predictor.whitening * &predictor.of_constants;
+            let mut here = white.rows_mut(step * n, n);
+            here.columns_mut(1, COMMON).gemm(1.0, &constants, &self.steady, 0.0);
+            for (column, left) in self.columns().zip(left.column_iter()) {
+                here.set_column(column, &left);
             }
-            parts.squares += value.norm_squared();
+            own.gemm(1.0, &constants.transpose(), &here, 1.0);
+            parts.own += constants.tr_mul(&constants);
             parts.ln_sd += predictor.ln_sd;
-            parts.information +=
-                Common::from_fn(|row, column| common.column(row).dot(&common.column(column)));
-            parts.score += CommonVector::from_fn(|row, _| common.column(row).dot(&value));
-            parts.own += &square;
-            parts.own_common += predictor.white_constants.tr_mul(&common);
-            parts.own_score += predictor.white_constants.tr_mul(&value);
         }
+        self.rest(&predictor, &mut white, &mut own, &mut parts);
+        let product = |one: usize, other: usize| white.column(one).dot(&white.column(other));
+        parts.squares = product(0, 0);
+        for row in 0..COMMON {
+            parts.score[row] = product(0, 1 + row);
+            for column in 0..=row {
+                let product = product(1 + row, 1 + column);
+                parts.information[(row, column)] = product;
+                parts.information[(column, row)] = product;
+            }
+        }
+        parts.own_score.copy_from(&own.column(0));
+        parts.own_common.copy_from(&own.columns(1, COMMON));
         let own_mps: Vec<f64> = self.drones.iter().map(|drone| own_mps[*drone]).collect();
         System::integrated(parts, &own_mps)
+    }
+
+    /// Where the columns of [`Self::records`] are among those of values and all common errors.
+    fn columns(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(0).chain(self.varying.iter().map(|column| 1 + column))
+    }
+
+    /// The steps that as many others predict as predict any, all at once.
+    fn rest(
+        &self,
+        predictor: &Predictor,
+        white: &mut DMatrix<f64>,
+        own: &mut DMatrix<f64>,
+        parts: &mut Parts,
+    ) {
+        let (n, order) = (self.drones.len(), self.order);
+        let rest = self.steps - 1 - order;
+        if rest == 0 {
+            return;
+        }
+        let constants = &predictor.whitening * &predictor.of_constants;
+        let steady = &constants * &self.steady;
+        let place = (order + 1) * n;
+        for (column, steady) in steady.column_iter().enumerate() {
+            for step in 0..rest {
+                white.view_mut((place + step * n, 1 + column), (n, 1)).copy_from(&steady);
+            }
+        }
+        for (column, record) in self.columns().zip(self.records.column_iter()) {
+            let record = record.as_slice();
+            let mut left = DMatrix::from_column_slice(n, rest, &record[..rest * n]);
+            // The steps before each of them, that of one shifted by a step against that of the next.
+            let before = DMatrixView::from_slice_with_strides(&record[n..], order * n, rest, 1, n);
+            left.gemm(-1.0, &predictor.ahead(), &before, 1.0);
+            let left = &predictor.whitening * left;
+            white.column_mut(column).rows_mut(place, rest * n).copy_from_slice(left.as_slice());
+        }
+        let sums = DMatrix::from_fn(n, 1 + COMMON, |channel, column| {
+            let steps = white.column(column);
+            (0..rest).map(|step| steps[place + step * n + channel]).sum()
+        });
+        own.gemm(1.0, &constants.transpose(), &sums, 1.0);
+        parts.own += constants.tr_mul(&constants) * rest as f64;
+        parts.ln_sd += predictor.ln_sd * rest as f64;
     }
 }
 
@@ -264,20 +313,20 @@ struct Predictor {
     /// Covariance of what is left.
     left: DMatrix<f64>,
     left_behind: DMatrix<f64>,
-    /// Lower triangle of the factor of `left`.
-    factor: Option<DMatrix<f64>>,
-    /// Sum of the logarithms of its diagonal.
+    /// What makes that white: the inverse of the lower triangle of its factor.
+    whitening: DMatrix<f64>,
+    /// Sum of the logarithms of the factor's diagonal.
     ln_sd: f64,
     /// What is left of constants of the channels, ahead and behind.
     of_constants: DMatrix<f64>,
     of_constants_behind: DMatrix<f64>,
-    white_constants: DMatrix<f64>,
     /// What was `ahead` before the last step.
     before: DMatrix<f64>,
 }
 
 impl Predictor {
-    fn new(lagged: DMatrix<f64>, n: usize, is_reversible: bool) -> Self {
+    /// Of no step yet; `None` where rounding leaves no positive definite covariance.
+    fn new(lagged: DMatrix<f64>, n: usize, is_reversible: bool) -> Option<Self> {
         let most = lagged.nrows() / n - 1;
         let variance = lagged.rows(most * n, n).into_owned();
         let coefficients = || DMatrix::zeros(n, most * n);
@@ -290,27 +339,19 @@ impl Predictor {
             is_reversible,
             left: variance.clone(),
             left_behind: variance,
-            factor: None,
+            whitening: DMatrix::zeros(n, n),
             ln_sd: 0.0,
             of_constants: DMatrix::identity(n, n),
             of_constants_behind: DMatrix::identity(n, n),
-            white_constants: DMatrix::zeros(n, n),
             before: coefficients(),
         };
-        new.factorise();
-        new
+        new.factorise()?;
+        Some(new)
     }
 
-    fn factorise(&mut self) {
-        self.factor = self.left.clone().cholesky().map(nalgebra::Cholesky::unpack);
-        self.ln_sd = self
-            .factor
-            .as_ref()
-            .map_or(0.0, |factor| factor.diagonal().iter().map(|value| value.ln()).sum());
-    }
-
-    fn factor(&self) -> Option<&DMatrix<f64>> {
-        self.factor.as_ref()
+    fn factorise(&mut self) -> Option<()> {
+        (self.whitening, self.ln_sd) = whitening(&self.left)?;
+        Some(())
     }
 
     /// Coefficients of the steps before, the last one first.
@@ -325,22 +366,22 @@ impl Predictor {
         let first = self.most.checked_sub(order + 1)? * n;
         let mut unexplained = self.lagged.rows(first, n).into_owned();
         unexplained.gemm(-1.0, &self.ahead(), &self.lagged.rows(first + n, known), 1.0);
-        // The factor of what is left ahead is at hand.
+        // The inverse of what is left ahead is at hand, but for one product.
         let by_ahead = |of: &DMatrix<f64>| {
-            let mut solved = self.factor.as_ref()?.solve_lower_triangular(of)?;
-            self.factor.as_ref()?.tr_solve_lower_triangular_mut(&mut solved);
-            Some(solved)
+            let white = &self.whitening * of;
+            white.transpose() * &self.whitening
         };
         let transposed = unexplained.transpose();
         let new_behind;
         let new;
         if self.is_reversible {
             // Behind is as ahead: the new coefficient is the same, too.
-            new = by_ahead(&transposed)?.transpose();
+            new = by_ahead(&transposed);
             new_behind = new.clone();
         } else {
-            new_behind = by_ahead(&unexplained)?.transpose();
-            new = self.left_behind.clone().cholesky()?.solve(&transposed).transpose();
+            new_behind = by_ahead(&unexplained);
+            let (whitening, _) = whitening(&self.left_behind)?;
+            new = (&whitening * &transposed).transpose() * whitening;
             self.left_behind.gemm(-1.0, &new_behind, &unexplained, 1.0);
         }
         self.left.gemm(-1.0, &new, &transposed, 1.0);
@@ -364,9 +405,25 @@ impl Predictor {
         self.ahead.columns_mut(known, n).copy_from(&new);
         self.behind.columns_mut(end - known - n, n).copy_from(&new_behind);
         self.order += 1;
-        self.factorise();
-        self.factor.is_some().then_some(())
+        self.factorise()
     }
+}
+
+/// The inverse of the lower triangle of a covariance's factor, with the sum of the logarithms of its diagonal.
+fn whitening(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+    let factor = covariance.clone().cholesky()?.unpack();
+    let ln_sd = factor.diagonal().iter().map(|value| value.ln()).sum();
+    let n = factor.nrows();
+    let mut inverse = DMatrix::identity(n, n);
+    for column in 0..n {
+        // Above its one there is nothing.
+        let (from, rest) = ((column, column), n - column);
+        let factor = factor.view(from, (rest, rest));
+        if !factor.solve_lower_triangular_mut(&mut inverse.view_mut(from, (rest, 1))) {
+            return None;
+        }
+    }
+    Some((inverse, ln_sd))
 }
 
 /// Ways between places, each once, and which of them it is from each place (column) to each other (row). On a grid most are
@@ -421,7 +478,7 @@ mod tests {
     use super::*;
     use crate::analysis::kriging::covariance::{Air, Form};
     use crate::analysis::kriging::data::{UNIFORM, Value};
-    use crate::analysis::kriging::vecchia::LEAST_OWN_MPS;
+    use crate::analysis::kriging::vecchia::{Common, CommonVector, LEAST_OWN_MPS};
     use nalgebra::DVector;
 
     const SIZE: Size = Size { drones: 100, operations: 1e12 };

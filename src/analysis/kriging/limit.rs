@@ -12,6 +12,7 @@ use super::data::{COMMON, Drone, Row, Rows};
 use super::make::{Input, prior_factor};
 use super::pairs::Pairs;
 use crate::analysis::running::RUNNING_S;
+use crate::numeric::cholesky;
 
 /// More values than this are thinned: the cost grows with the third power. Numerical.
 const MOST: usize = 1500;
@@ -78,7 +79,7 @@ pub(in super::super) fn best(input: &Input<'_>, air: &[Air]) -> Option<Limit> {
     }
     let mean = DVector::from_fn(COMMON, |row, _| component.shift.get(row).copied().unwrap_or(0.0));
     let values = DVector::from_fn(n, |row, _| rows.list[row].value_mps) - common * mean;
-    let of_values = of_values.cholesky()?;
+    let of_values = cholesky(of_values)?;
     let of_mean = of_air.column_mean();
     let mean_variance = of_mean.mean() - of_mean.dot(&of_values.solve(&of_mean));
     let found = of_air * of_values.solve(&values);

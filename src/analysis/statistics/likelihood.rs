@@ -24,6 +24,12 @@ const SHORTEST: f64 = 0.25;
 const LONGEST: f64 = 60.0;
 /// Range of the noise's variance over that of the air, logarithms.
 const LN_NOISE: (f64, f64) = (-18.0, 4.0);
+/// Modes that are filtered side by side. Numerical: each waits for its own division from block to block.
+const LANES: usize = 8;
+/// First step of the search for time and noise, logarithms: from a guess, ...
+const FAR: f64 = 0.4;
+/// ... and from those of a length nearby. Numerical.
+const NEAR: f64 = 0.15;
 /// A search by steps that has not ended by then will not.
 const MOST_STEPS: usize = 200;
 
@@ -176,10 +182,12 @@ impl Likelihood {
         let mut index = (((guess.0.ln() - first_guess) / STEP).round().max(0.0) as usize).min(last);
         let mut found: Vec<Option<Best>> = vec![None; self.grid.len()];
         let mut start = [guess.1.ln(), -4.0];
+        let mut step = FAR;
         let mut best = |index: usize, start: [f64; 2]| -> Option<Best> {
             let slot = found.get_mut(index)?;
             if slot.is_none() {
-                *slot = self.best(values, self.grid.get(index)?, start);
+                *slot = self.best(values, self.grid.get(index)?, start, step);
+                step = NEAR;
             }
             *slot
         };
@@ -248,7 +256,13 @@ impl Likelihood {
         ((0.1 * self.blocks.running as f64).max(0.5).ln(), (30.0 * self.length_s).ln())
     }
 
-    fn best(&self, values: &DMatrix<f64>, modes: &Modes, start: [f64; 2]) -> Option<Best> {
+    fn best(
+        &self,
+        values: &DMatrix<f64>,
+        modes: &Modes,
+        start: [f64; 2],
+        step: f64,
+    ) -> Option<Best> {
         let rotated = &modes.vectors * values;
         let (shortest, longest) = self.time_range();
         let inside =
@@ -258,7 +272,7 @@ impl Likelihood {
             let outside = (at[0] - near[0]).powi(2) + (at[1] - near[1]).powi(2);
             -self.profile(modes, &rotated, near).0 + 10.0 * outside
         };
-        let at = inside(minimum(loss, inside(start)));
+        let at = inside(minimum(loss, inside(start), step));
         let (log_likelihood, variance) = self.profile(modes, &rotated, at);
         let usable = log_likelihood.is_finite() && variance > 0.0;
         usable.then_some(Best { at, log_likelihood, variance })
@@ -266,89 +280,104 @@ impl Likelihood {
 
     /// Restricted log-likelihood at the best variance, and that variance.
     fn profile(&self, modes: &Modes, rotated: &DMatrix<f64>, at: [f64; 2]) -> (f64, f64) {
-        let noise = at[1].exp();
         let filter = BlockFilter::new(at[0].exp(), self.blocks.running);
+        let noise = at[1].exp();
         let count = modes.variance.len();
-        let blank = || vec![0.0; count];
-        let mut p: Vec<f64> = modes.variance.clone();
-        let (mut m, mut one, mut time) = (blank(), blank(), blank());
-        let (mut squares, mut determinant) = (blank(), vec![1.0; count]);
-        // Sums over time of products of innovations: of 1, of time, and of the data with each.
-        let (mut s11, mut s1y) = (blank(), blank());
-        let (mut s1t, mut stt, mut sty) = (blank(), blank(), blank());
+        let (mut sum, mut ln_determinant) = (0.0, 0.0);
+        for first in (0..count).step_by(LANES) {
+            let (of_sum, of_ln) = if self.unknown.slope {
+                self.some_modes::<true>(&filter, noise, (modes, rotated), first)
+            } else {
+                self.some_modes::<false>(&filter, noise, (modes, rotated), first)
+            };
+            sum += of_sum;
+            ln_determinant += of_ln;
+        }
+        let free = count * (self.blocks.count() - 1 - usize::from(self.unknown.slope));
+        let variance = sum / free as f64;
+        (-0.5 * (free as f64 * (variance.ln() + 1.0) + ln_determinant), variance)
+    }
+
+    /// The sum of squares of some modes, [`LANES`] of them from the first on, without what means (and slopes) explain, and the
+    /// logarithm of the determinant.
+    fn some_modes<const SLOPE: bool>(
+        &self,
+        filter: &BlockFilter,
+        noise: f64,
+        (modes, rotated): (&Modes, &DMatrix<f64>),
+        first: usize,
+    ) -> (f64, f64) {
+        let variances = modes.variance.get(first..).unwrap_or_default();
+        let lanes = variances.len().min(LANES);
+        let mut variance = [1.0; LANES];
+        variance[..lanes].copy_from_slice(&variances[..lanes]);
+        let mut p = variance;
+        let [mut m, mut one, mut time] = [[0.0; LANES]; 3];
+        // Sums over time of products of innovations: of the data, of 1 and of time.
+        let [mut squares, mut s11, mut s1y, mut s1t, mut stt, mut sty] = [[0.0; LANES]; 6];
+        let mut determinant = [1.0; LANES];
+        let mut ln_determinant = 0.0;
         let blocks = self.blocks.count();
-        let (mut ln_determinant, mut elapsed) = (0.0, 0.0);
+        let mut elapsed = 0.0;
         let half = self.blocks.steps.iter().sum::<usize>() as f64 / 2.0;
         for (block, (step, column)) in
             self.blocks.steps.iter().zip(rotated.column_iter()).enumerate()
         {
             if *step > 1 {
                 let keep = filter.keep.powi(*step as i32 - 1);
-                for ((p, m), (one, (time, s))) in p
-                    .iter_mut()
-                    .zip(&mut m)
-                    .zip(one.iter_mut().zip(time.iter_mut().zip(&modes.variance)))
-                {
-                    *p = keep * keep * *p + (1.0 - keep * keep) * s;
-                    *m *= keep;
-                    *one *= keep;
-                    *time *= keep;
+                for lane in 0..LANES {
+                    p[lane] = keep * keep * p[lane] + (1.0 - keep * keep) * variance[lane];
+                    m[lane] *= keep;
+                    one[lane] *= keep;
+                    time[lane] *= keep;
                 }
             }
             elapsed += *step as f64;
             let clock = (elapsed - half) / half;
-            let data = column.as_slice();
-            let slope = self.unknown.slope;
-            // Slices of one length: then the loop needs no checks.
-            let (variance, data) = (&modes.variance[..count], &data[..count]);
-            let (p, m, one, time) =
-                (&mut p[..count], &mut m[..count], &mut one[..count], &mut time[..count]);
-            let (squares, determinant) = (&mut squares[..count], &mut determinant[..count]);
-            let (s11, s1y) = (&mut s11[..count], &mut s1y[..count]);
-            let (s1t, stt, sty) = (&mut s1t[..count], &mut stt[..count], &mut sty[..count]);
-            for i in 0..count {
-                let (s, prior, y) = (variance[i], p[i], data[i]);
+            let mut data = [0.0; LANES];
+            let values = column.as_slice().get(first..first + lanes).unwrap_or_default();
+            data[..values.len()].copy_from_slice(values);
+            for lane in 0..LANES {
+                let (s, prior) = (variance[lane], p[lane]);
                 let f = filter.a * filter.a * prior + filter.r * s + noise;
                 let weight = 1.0 / f;
                 let gain = (filter.keep * filter.a * prior + filter.qr * s) * weight;
-                p[i] = filter.keep * filter.keep * prior + filter.q * s - gain * gain * f;
-                let v = y - filter.a * m[i];
-                m[i] = filter.keep * m[i] + gain * v;
-                let v1 = 1.0 - filter.a * one[i];
-                one[i] = filter.keep * one[i] + gain * v1;
-                squares[i] += v * v * weight;
-                s11[i] += v1 * v1 * weight;
-                s1y[i] += v1 * v * weight;
-                determinant[i] *= f;
-                if slope {
-                    let vt = clock - filter.a * time[i];
-                    time[i] = filter.keep * time[i] + gain * vt;
-                    s1t[i] += v1 * vt * weight;
-                    stt[i] += vt * vt * weight;
-                    sty[i] += vt * v * weight;
+                p[lane] = filter.keep * filter.keep * prior + filter.q * s - gain * gain * f;
+                let v = data[lane] - filter.a * m[lane];
+                m[lane] = filter.keep * m[lane] + gain * v;
+                let v1 = 1.0 - filter.a * one[lane];
+                one[lane] = filter.keep * one[lane] + gain * v1;
+                squares[lane] += v * v * weight;
+                s11[lane] += v1 * v1 * weight;
+                s1y[lane] += v1 * v * weight;
+                determinant[lane] *= f;
+                if SLOPE {
+                    let vt = clock - filter.a * time[lane];
+                    time[lane] = filter.keep * time[lane] + gain * vt;
+                    s1t[lane] += v1 * vt * weight;
+                    stt[lane] += vt * vt * weight;
+                    sty[lane] += vt * v * weight;
                 }
             }
             if block % 16 == 15 || block + 1 == blocks {
-                for determinant in determinant.iter_mut() {
+                for determinant in &mut determinant[..lanes] {
                     ln_determinant += determinant.ln();
                     *determinant = 1.0;
                 }
             }
         }
         let mut sum = 0.0;
-        for i in 0..count {
-            sum += squares[i] - s1y[i] * s1y[i] / s11[i];
-            ln_determinant += s11[i].ln();
-            if self.unknown.slope {
-                let rest = stt[i] - s1t[i] * s1t[i] / s11[i];
-                let with = sty[i] - s1t[i] * s1y[i] / s11[i];
+        for lane in 0..lanes {
+            sum += squares[lane] - s1y[lane] * s1y[lane] / s11[lane];
+            ln_determinant += s11[lane].ln();
+            if SLOPE {
+                let rest = stt[lane] - s1t[lane] * s1t[lane] / s11[lane];
+                let with = sty[lane] - s1t[lane] * s1y[lane] / s11[lane];
                 sum -= with * with / rest;
                 ln_determinant += rest.ln();
             }
         }
-        let free = count * (blocks - 1 - usize::from(self.unknown.slope));
-        let variance = sum / free as f64;
-        (-0.5 * (free as f64 * (variance.ln() + 1.0) + ln_determinant), variance)
+        (sum, ln_determinant)
     }
 }
 

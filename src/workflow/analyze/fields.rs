@@ -23,23 +23,55 @@ pub(super) fn write_fields(
     wish: &Files,
 ) -> Result<(), WorkflowError> {
     let origin = origin(provenance, wish);
+    // Each compresses by itself what takes long to compress.
+    let (drones, (netcdf, others)) = rayon::join(
+        || write_drones(analysis, &origin, folder),
+        || {
+            rayon::join(
+                || write_netcdf(host, (analysis, &origin), folder, wish),
+                || write_others(analysis, &origin, folder),
+            )
+        },
+    );
+    drones.and(others).and(netcdf)
+}
+
+/// Writes the tables of all drones, or removes those of an earlier analysis.
+fn write_drones(analysis: &Analysis, origin: &Origin, folder: &Path) -> Result<(), WorkflowError> {
     let (csv, parquet) = (campaign::fields_csv(folder), campaign::fields_parquet(folder));
-    if fields::any(analysis) {
-        write_with(&csv, |out| fields::write_csv(analysis, out))?;
-        #[cfg(feature = "parquet")]
-        write_parquet(&parquet, crate::products::fields_parquet::parquet(analysis, &origin))?;
-        #[cfg(not(feature = "parquet"))]
-        remove(&[parquet]);
-    } else {
+    if !fields::any(analysis) {
         remove(&[csv, parquet]);
+        return Ok(());
     }
+    let as_csv = || write_with(&csv, |out| fields::write_csv(analysis, out));
+    #[cfg(feature = "parquet")]
+    {
+        let as_parquet =
+            || write_parquet(&parquet, crate::products::fields_parquet::parquet(analysis, origin));
+        let (csv, parquet) = rayon::join(as_csv, as_parquet);
+        csv?;
+        parquet
+    }
+    #[cfg(not(feature = "parquet"))]
+    {
+        let _ = origin;
+        remove(&[parquet]);
+        Ok(as_csv()?)
+    }
+}
+
+/// Writes the tables of the grid, of turbulence and of thermals, and what maps show, or removes those of an earlier analysis.
+fn write_others(analysis: &Analysis, origin: &Origin, folder: &Path) -> Result<(), WorkflowError> {
     let (csv, parquet) = (campaign::fields_grid_csv(folder), campaign::fields_grid_parquet(folder));
     if fields_grid::any(analysis) {
         write_with(&csv, |out| fields_grid::write_csv(analysis, out))?;
         #[cfg(feature = "parquet")]
-        write_parquet(&parquet, crate::products::fields_parquet::grid_parquet(analysis, &origin))?;
+        write_parquet(&parquet, crate::products::fields_parquet::grid_parquet(analysis, origin))?;
         #[cfg(not(feature = "parquet"))]
-        remove(&[parquet]);
+        {
+            let _ = origin;
+            remove(&[parquet]);
+        }
     } else {
         remove(&[csv, parquet]);
     }
@@ -50,7 +82,6 @@ pub(super) fn write_fields(
     } else {
         remove(&[path]);
     }
-    write_netcdf(host, (analysis, &origin), folder, wish)?;
     text(&campaign::fields_geojson(folder), geojson::geojson(analysis))?;
     text(&campaign::fields_kml(folder), kml::kml(analysis))
 }

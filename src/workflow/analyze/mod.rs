@@ -293,17 +293,23 @@ impl Analysed {
         }
         let study = read_study(host, &self.root);
         let report_folder = folder.join("report");
-        // The page tells the hash of the numbers, which come first; the tables are written beside it.
-        let numbers = write_numbers(&self.analysis, folder)?;
+        // The page tells the hash of the numbers, which are written while its figures are drawn; the tables are written beside it.
+        let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
+        let (hash, drawn) = rayon::join(
+            || {
+                let numbers = write_numbers(&self.analysis, folder)?;
+                Ok::<_, WorkflowError>(Hashes::default().sha256(&numbers)?)
+            },
+            || report::draw(&self.analysis, beside),
+        );
         let provenance = Provenance {
-            analysis_sha256: Some(Hashes::default().sha256(&numbers)?),
+            analysis_sha256: Some(hash?),
             links: pages::of_report(&self.root, folder, &self.analysis),
             ..self.provenance.clone().unwrap_or_default()
         };
         let (page_made, fields_made) = rayon::join(
             || {
-                let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
-                let made = report::render_with(&self.analysis, beside, &provenance)?;
+                let made = drawn.page(&self.analysis, &provenance)?;
                 self.write_turbulence(folder, &report_folder, &provenance)?;
                 Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
             },

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::report::chromium::{Browser, Key, Tab};
 use crate::report::synthetic::{crowd, provenance, traced, whole_campaign};
 use updraft::analysis::result::{Analysis, FlightSite};
-use updraft::report::{Basemap, Beside, Corners, render, render_with, write};
+use updraft::report::{Basemap, Beside, Corners, draw, render, write};
 
 /// Writes a report; the page's address and the folder of screenshots.
 fn report(name: &str, analysis: &Analysis) -> (String, PathBuf) {
@@ -342,7 +342,7 @@ fn a_picture_of_the_ground_turns_with_the_grid_and_shows_through() {
     let picture = Basemap::new("field.png", bytes, corners, credit).unwrap();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-explorer").join("ground");
     let beside = Beside { study: None, basemap: Some(&picture) };
-    let made = render_with(&analysis, beside, &provenance()).unwrap();
+    let made = draw(&analysis, beside).page(&analysis, &provenance()).unwrap();
     assert_eq!(made.html.matches("class=\"basemap\"").count(), 1, "once in the page");
     assert!(made.html.contains("The ground is field.png, the surveyor&#x27;s."));
     write(&made, &folder).unwrap();

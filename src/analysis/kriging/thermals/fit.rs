@@ -1,6 +1,6 @@
 //! The most probable thermal in air of given scales, and how well it is known.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::shape::{
@@ -9,7 +9,7 @@ use super::shape::{
 use super::whiten::{White, Whitening};
 use crate::analysis::kriging::data::Rows;
 use crate::analysis::kriging::scales::ENOUGH;
-use crate::numeric::{Least, differences, minimise_roughly};
+use crate::numeric::{Least, differences_at_once, minimise_roughly};
 
 /// A peak before the values are seen: standard deviation, m/s. Thermals that small drones fly in; chosen.
 const PEAK_MPS: f64 = 2.0;
@@ -38,6 +38,8 @@ const RADII_M: [f64; 3] = [10.0, 20.0, 40.0];
 const PARTS: usize = 5;
 /// Starts that are followed to their top.
 const FOLLOWED: usize = 4;
+/// Starts that are looked at together. Numerical: records of a few thousand values then stay close to the processor.
+const AT_ONCE: usize = 8;
 /// Starts closer than this are one, units of the search.
 const ONE_START: f64 = 1.5;
 /// Step of differences, units of the search. Numerical.
@@ -203,8 +205,22 @@ impl Fit<'_> {
 
     /// Logarithm of the density of the values with a thermal of these numbers and any peak, over that without.
     fn log_density(&self, numbers: &Numbers, at_s: f64) -> f64 {
-        let shape = self.white(numbers, at_s);
-        let precision = shape.dot(&shape) + 1.0 / (PEAK_MPS * PEAK_MPS);
+        self.of_shape(numbers, &self.white(numbers, at_s))
+    }
+
+    /// The same of several thermals.
+    fn log_densities(&self, thermals: &[(Numbers, f64)]) -> Vec<f64> {
+        let records = thermals.iter().map(|(numbers, at_s)| record(self.rows, numbers, *at_s));
+        let columns: Vec<f64> = records.flatten().collect();
+        let records = DMatrix::from_vec(self.rows.list.len(), thermals.len(), columns);
+        let shapes = self.whitening.all_white(records);
+        let each = thermals.iter().zip(&shapes);
+        each.map(|((numbers, _), shape)| self.of_shape(numbers, shape)).collect()
+    }
+
+    /// The same of a thermal whose record was made white.
+    fn of_shape(&self, numbers: &Numbers, shape: &White) -> f64 {
+        let precision = shape.dot(shape) + 1.0 / (PEAK_MPS * PEAK_MPS);
         let score = shape.dot(&self.values);
         // A peak that sinks is no thermal: half of the prior says so.
         let gain = if score > 0.0 { 0.5 * score * score / precision } else { 0.0 };
@@ -215,16 +231,18 @@ impl Fit<'_> {
 
     /// The most probable thermal.
     pub(super) fn best(&self) -> Option<Candidate> {
-        let mut starts: Vec<(Numbers, f64, f64)> = self
-            .region
-            .starts()
-            .into_par_iter()
-            .map(|(numbers, at_s)| {
-                let value = self.log_density(&numbers, at_s);
-                (numbers, at_s, value)
-            })
-            .filter(|(_, _, value)| value.is_finite())
-            .collect();
+        let valued = |starts: &[(Numbers, f64)]| -> Vec<(Numbers, f64, f64)> {
+            let values = self.log_densities(starts).into_iter();
+            starts
+                .iter()
+                .zip(values)
+                .map(|((numbers, at_s), value)| (*numbers, *at_s, value))
+                .collect()
+        };
+        let starts = self.region.starts();
+        let mut starts: Vec<(Numbers, f64, f64)> =
+            starts.par_chunks(AT_ONCE).flat_map_iter(valued).collect();
+        starts.retain(|(_, _, value)| value.is_finite());
         starts.sort_by(|a, b| b.2.total_cmp(&a.2));
         let mut followed: Vec<(Numbers, f64)> = Vec::new();
         for (numbers, at_s, _) in starts {
@@ -245,7 +263,11 @@ impl Fit<'_> {
             .par_iter()
             .map(|(start, at_s)| {
                 let loss = |numbers: &Numbers| -self.log_density(numbers, *at_s);
-                let slopes = |at: &Numbers, value| differences(loss, at, value);
+                let losses = |places: &[Numbers; NUMBERS]| -> Numbers {
+                    let values = self.log_densities(&places.map(|numbers| (numbers, *at_s)));
+                    std::array::from_fn(|index| -values[index])
+                };
+                let slopes = |at: &Numbers, value| differences_at_once(losses, at, value);
                 let Least { at, value: least, .. } =
                     minimise_roughly(*start, None, ENOUGH, loss, slopes);
                 (at, *at_s, -least)

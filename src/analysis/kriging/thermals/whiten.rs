@@ -15,6 +15,9 @@ use crate::analysis::kriging::vecchia::{Common, LEAST_OWN_MPS, Weights, weights}
 /// record of 25 drones over 300 s has 750.
 const MOST_AT_ONCE: usize = 800;
 
+/// Records that are made white side by side: weights and places of a value's neighbours are looked up once for all of them.
+const LANES: usize = 8;
+
 /// What takes the correlation of the air out of a record.
 enum Uncorrelated<'a> {
     /// The factor of the covariance of all values.
@@ -58,17 +61,27 @@ impl<'a> Uncorrelated<'a> {
             Self::Neighbours(neighbours, weights, inverse) => {
                 let mut white = DMatrix::zeros(raw.nrows(), raw.ncols());
                 let record = raw.nrows().max(1);
-                for (raw, white) in raw
-                    .as_slice()
-                    .chunks_exact(record)
-                    .zip(white.as_mut_slice().chunks_exact_mut(record))
-                {
-                    for (index, white) in white.iter_mut().enumerate() {
+                let some = raw.as_slice().chunks(LANES * record);
+                for (raw, white) in some.zip(white.as_mut_slice().chunks_mut(LANES * record)) {
+                    let lanes = raw.len() / record;
+                    let mut by_value = vec![[0.0; LANES]; record];
+                    for (lane, raw) in raw.chunks_exact(record).enumerate() {
+                        by_value.iter_mut().zip(raw).for_each(|(of, raw)| of[lane] = *raw);
+                    }
+                    for (index, own) in by_value.iter().enumerate() {
                         let pattern = neighbours.of[index];
+                        let mut expected = [0.0; LANES];
                         let near = weights[pattern].of.iter().zip(&neighbours.rows[index]);
-                        let expected: f64 =
-                            near.map(|(weight, near)| weight * raw[*near as usize]).sum();
-                        *white = (raw[index] - expected) * inverse[pattern];
+                        for (weight, near) in near {
+                            let near = &by_value[*near as usize];
+                            for lane in 0..LANES {
+                                expected[lane] += weight * near[lane];
+                            }
+                        }
+                        let inverse = inverse[pattern];
+                        for lane in 0..lanes {
+                            white[lane * record + index] = (own[lane] - expected[lane]) * inverse;
+                        }
                     }
                 }
                 white
@@ -139,11 +152,24 @@ impl<'a> Whitening<'a> {
 
     /// A record made white.
     pub(super) fn white(&self, record: &[f64]) -> White {
-        let raw = DMatrix::from_column_slice(record.len(), 1, record);
-        let values = self.uncorrelated.white(raw).column(0).into_owned();
+        let values = self.uncorrelated.white(DMatrix::from_column_slice(record.len(), 1, record));
+        let values = values.column(0).into_owned();
         let mut explained = self.nuisance.tr_mul(&values);
         self.information.l_dirty().solve_lower_triangular_mut(&mut explained);
         White { values, explained }
+    }
+
+    /// Several records made white, each in a column.
+    pub(super) fn all_white(&self, records: DMatrix<f64>) -> Vec<White> {
+        let values = self.uncorrelated.white(records);
+        let mut explained = self.nuisance.tr_mul(&values);
+        self.information.l_dirty().solve_lower_triangular_mut(&mut explained);
+        let each = values.column_iter().zip(explained.column_iter());
+        each.map(|(values, explained)| White {
+            values: values.into_owned(),
+            explained: explained.into_owned(),
+        })
+        .collect()
     }
 
     /// Logarithm of the density of a record, but for a constant.
