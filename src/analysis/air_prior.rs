@@ -283,6 +283,18 @@ mod tests {
     }
 
     #[test]
+    fn a_likelihood_alone_is_that_of_the_fit() {
+        let mut record = record(&[1500.3, 1502.0, 1504.1, 1506.0, 1508.2]);
+        record.design = DMatrix::from_fn(5, 2, |row, column| (row as f64).powi(column as i32));
+        for sd_mps in [0.0, 0.3, 2.0] {
+            let covariance = record.covariance(&Air { sd_mps, tau_s: 100.0, white_us: 0.3 });
+            let fit = record.solve(covariance.clone()).unwrap();
+            let alone = record.log_likelihood(covariance).unwrap();
+            assert!((alone - fit.log_likelihood).abs() < 1e-6, "{alone} {}", fit.log_likelihood);
+        }
+    }
+
+    #[test]
     fn still_windows_speak_for_still_air() {
         let still: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let record = record(&still);

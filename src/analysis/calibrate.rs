@@ -272,8 +272,8 @@ fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
         }
         low = std::mem::replace(&mut high, (high_us.powi(2), excess(high_us.powi(2))?));
     }
-    // The chord, with the value at an end that stays halved (Dowell and Jarratt 1971).
-    let mut at = high.0;
+    // The chord; the value at an end that stays twice is halved (Dowell and Jarratt 1971).
+    let (mut at, mut last) = (high.0, 0.0);
     for _ in 0..MOST_CHORDS {
         let before = at;
         at = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
@@ -283,11 +283,16 @@ fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
         }
         if found > 0.0 {
             low = (at, found);
-            high.1 *= 0.5;
+            if last > 0.0 {
+                high.1 *= 0.5;
+            }
         } else {
             high = (at, found);
-            low.1 *= 0.5;
+            if last < 0.0 {
+                low.1 *= 0.5;
+            }
         }
+        last = found;
     }
     Some(at.sqrt())
 }

@@ -330,6 +330,7 @@ struct Profile {
     /// Velocity, m/s, weight, and pulse from the mean on, us, of each point.
     points: Vec<[f64; 3]>,
     weight: f64,
+    mean_mps: f64,
     mean_us: f64,
     /// Sum of the squares of the pulses.
     yy: f64,
@@ -339,20 +340,24 @@ impl Profile {
     fn of(points: &[LawPoint], sigmas: &[f64]) -> Self {
         let weighted = || points.iter().zip(sigmas.iter().map(|sigma| 1.0 / (sigma * sigma)));
         let weight: f64 = weighted().map(|(_, weight)| weight).sum();
-        let sum_us: f64 = weighted().map(|(point, weight)| weight * point.pulse_us).sum();
-        let mean_us = sum_us / weight;
+        let mean = |of: fn(&LawPoint) -> f64| {
+            weighted().map(|(point, own)| own * of(point)).sum::<f64>() / weight
+        };
+        let (mean_mps, mean_us) = (mean(|point| point.velocity_mps), mean(|point| point.pulse_us));
         let points: Vec<[f64; 3]> = weighted()
             .map(|(point, weight)| [point.velocity_mps, weight, point.pulse_us - mean_us])
             .collect();
         let yy = points.iter().map(|[_, weight, y]| weight * y * y).sum();
-        Self { points, weight, mean_us, yy }
+        Self { points, weight, mean_mps, mean_us, yy }
     }
 
     /// The least chi² at a W with A, u0 and W; `None` where all points have one speed through the air.
     fn at(&self, w_mps: f64) -> Option<(f64, [f64; 3])> {
         let (mut sum, mut square, mut xy) = (0.0, 0.0, 0.0);
+        // From about the middle on: nothing cancels then.
+        let middle = signed_square(self.mean_mps - w_mps);
         for [velocity_mps, weight, y] in &self.points {
-            let x = signed_square(velocity_mps - w_mps);
+            let x = signed_square(velocity_mps - w_mps) - middle;
             let weighted = weight * x;
             sum += weighted;
             square += weighted * x;
@@ -362,8 +367,8 @@ impl Profile {
         let xx = square - sum * mean;
         let slope = xy / xx;
         let chi2 = (self.yy - slope * xy).max(0.0);
-        (xx > self.weight * LEAST_SPREAD)
-            .then_some((chi2, [slope, self.mean_us - slope * mean, w_mps]))
+        let u0_us = self.mean_us - slope * (middle + mean);
+        (xx > self.weight * LEAST_SPREAD).then_some((chi2, [slope, u0_us, w_mps]))
     }
 }
 

@@ -138,7 +138,7 @@ pub(super) fn wind_of(
     tilt_wind(&leans, drag)
 }
 
-/// All of a map and of what its logs showed that its statistics are of.
+/// Values of a map and of its logs from which its statistics are made.
 pub(super) struct Observed {
     field: FieldInput,
     /// Single seconds of each drone; `None` without a law of the flock.

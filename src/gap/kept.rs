@@ -9,7 +9,6 @@ use super::instead::{effect_after_all, fewer_instead};
 use super::lean_channel::may_lack_drag;
 use super::model_flights::ModelFlights;
 use super::search::FAR_NATS;
-use super::single::undone_by_another;
 use super::verdict::{Finding, Gap, Step};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -106,9 +105,6 @@ impl Question<'_> {
         }
         if let Some(alone) = self.without_unknowns(train, held, &found, &gap)? {
             (found, gap) = alone;
-        }
-        if let Some(raw) = gap.drones.or(gap.rungs) {
-            undone_by_another(&mut found.steps, raw.before_us.value);
         }
         if !grows(&gap) {
             return Ok((found, gap));

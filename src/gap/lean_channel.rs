@@ -231,6 +231,21 @@ mod tests {
     }
 
     #[test]
+    fn what_the_model_does_not_get_has_no_size() {
+        let mut told = trial::step(trial::name("blade-flapping"), 26.0, &[]);
+        let size = Fitted {
+            name: "drag_per_weight".to_owned(),
+            unit: "s/m".to_owned(),
+            value: Interval { value: 0.027, low: 0.021, high: 0.033 },
+            before: None,
+        };
+        told.finding = Finding::Class { effects: alike(), parameters: vec![size] };
+        let left = not_taken_in(&told);
+        assert_eq!(left.finding, Finding::Class { effects: alike(), parameters: Vec::new() });
+        assert_eq!(left.gain_nats, 26.0);
+    }
+
+    #[test]
     fn areas_of_a_round_body_are_alike_and_never_negative() {
         let body = Body { square: 0.002, square_se: 0.0012, better_nats: 9.0 };
         let mut vehicle = trial::vehicle();

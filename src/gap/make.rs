@@ -157,11 +157,15 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     if grows(&shrink)
         && let Some(step) = &leans
     {
-        // The drag that no lean tells from this one can change the pulse in another way: the model stays as it was.
-        let (without, gap) = answered(if channel.in_log { vehicle } else { &repaired }, &[])?;
-        if !grows(&gap) {
-            leans = Some(super::lean_channel::not_taken_in(step));
-            (found, shrink) = (without, gap);
+        // The drag that no lean tells from this one can change the pulse in another way: then the model goes without, and the pulse
+        // is searched again.
+        match answered(if channel.in_log { vehicle } else { &repaired }, &[]) {
+            Ok((without, gap)) if !grows(&gap) => {
+                leans = Some(super::lean_channel::not_taken_in(step));
+                (found, shrink) = (without, gap);
+            }
+            Err(error) if !error.is_not_flown() => return Err(error),
+            _ => {}
         }
     }
     if shrink.left_over().is_some() {
@@ -176,6 +180,10 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;
         super::explain::settle(&mut found);
+    }
+    // Between two simulations sets of effects were held against each other.
+    if let Some(raw) = shrink.drones.or(shrink.rungs).filter(|_| !whole.is_foreign()) {
+        super::single::undone_by_another(&mut found.steps, raw.before_us.value);
     }
     super::in_field::tell(&mut found, vehicle)?;
     super::explain::form::tell(&mut found.steps, &found.vehicle);

@@ -140,10 +140,15 @@ fn what_it_means(finding: &Finding) -> String {
             "The model had this effect, with another size.".to_owned()
         }
         Finding::Name { .. } => "The model did not have this effect.".to_owned(),
-        Finding::Class { effects, .. } => format!(
+        Finding::Class { effects, parameters } => format!(
             "One of these {} is missing; in this flight they leave the same trace, so choosing \
-             one would be a guess. The first one represents them in the model.",
-            effects.len()
+             one would be a guess. {}",
+            effects.len(),
+            if parameters.is_empty() {
+                "None of them is in the model: with the first one it came no nearer to the drones that were held out."
+            } else {
+                "The first one represents them in the model."
+            }
         ),
         Finding::Unknown { formula, .. } => {
             let formula = formula

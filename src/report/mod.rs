@@ -76,6 +76,7 @@ mod turbulence_page;
 mod typographic;
 mod vendor;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use thiserror::Error;
@@ -224,6 +225,21 @@ pub fn render_with_study(
 /// If the folder or a file cannot be written.
 pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     write_named(report, folder, PAGE_FILE)
+}
+
+/// Removes the drawings of an earlier analysis from a report's folder: those that are none of `kept`, by their names. Files that
+/// this program did not draw stay.
+pub fn remove_other_figures(folder: &Path, kept: &BTreeSet<String>) {
+    let entries = std::fs::read_dir(folder.join(FIGURES_FOLDER)).into_iter().flatten().flatten();
+    for path in entries.map(|entry| entry.path()) {
+        let is_svg = path.extension().is_some_and(|extension| extension == "svg");
+        let name = path.file_stem().and_then(|name| name.to_str());
+        let is_other = is_svg && name.is_some_and(|name| !kept.contains(name));
+        if is_other && sheet::is_drawing(&path) {
+            // One that stays is linked by no page.
+            let _ = std::fs::remove_file(&path);
+        }
+    }
 }
 
 /// [`write()`] of a page of another name beside the report.

@@ -52,7 +52,7 @@ pub(super) fn figures(
     draw(analysis, beside, format).figures.files
 }
 
-/// What takes long of a page and does not tell where its numbers come from: its sections with their figures.
+/// Sections of a page with their figures: all that takes long, and does not tell where the numbers come from.
 pub struct Drawn {
     air: Vec<Value>,
     laws: Option<Value>,

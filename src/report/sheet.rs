@@ -1,6 +1,8 @@
 //! Sheets that put panels side by side in one small, repeatable SVG.
 
 use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::Path;
 
 use kuva::backend::svg::SvgBackend;
 use kuva::render::render::{PathData, Primitive, Scene};
@@ -10,6 +12,7 @@ use super::colour::INK;
 use super::format::Format;
 use super::svg::{Drawing, escape};
 use super::text::clean;
+use crate::base::file::open_regular;
 
 /// Font of figures; all are found on the reader's machine or replaced there.
 pub(super) const FONT: &str =
@@ -89,10 +92,27 @@ impl Sheet {
     }
 }
 
+/// What figures begin with.
+const HEAD: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ";
+/// Within so many bytes is the opening tag.
+const HEAD_BYTES: u64 = 512;
+
+/// Whether a file begins as the figures of this program do: with its font in the opening tag.
+pub(super) fn is_drawing(path: &Path) -> bool {
+    let Ok((file, _)) = open_regular(path) else { return false };
+    let mut head = Vec::new();
+    if file.take(HEAD_BYTES).read_to_end(&mut head).is_err() {
+        return false;
+    }
+    let head = String::from_utf8_lossy(&head);
+    let has_font = |font: &str| head.contains(&format!("font-family=\"{}\"", escape(font)));
+    head.starts_with(HEAD) && (has_font(FONT) || has_font(PRINT_FONT))
+}
+
 /// Opening tag and title of a figure.
 pub(super) fn svg_head(format: Format, [width, height]: [f64; 2], title: &str) -> String {
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+        "{HEAD}{width} {height}\" \
          {} role=\"img\" font-family=\"{}\" fill=\"{INK}\"><title>{}</title>",
         format.lengths([width, height]),
         escape(format.choose(FONT, PRINT_FONT)),

@@ -254,7 +254,7 @@ impl Blocks {
         std::iter::once(0).chain(self.varying.iter().map(|column| 1 + column))
     }
 
-    /// The steps that as many others predict as predict any, all at once.
+    /// All steps at once that have more steps before them than predict any.
     fn rest(
         &self,
         predictor: &Predictor,
@@ -278,7 +278,7 @@ impl Blocks {
         for (column, record) in self.columns().zip(self.records.column_iter()) {
             let record = record.as_slice();
             let mut left = DMatrix::from_column_slice(n, rest, &record[..rest * n]);
-            // The steps before each of them, that of one shifted by a step against that of the next.
+            // The steps before each: a column is the next one, shifted by a step.
             let before = DMatrixView::from_slice_with_strides(&record[n..], order * n, rest, 1, n);
             left.gemm(-1.0, &predictor.ahead(), &before, 1.0);
             let left = &predictor.whitening * left;
@@ -577,6 +577,104 @@ mod tests {
             let variance = 1.0 / (information + 1.0 / 9.0);
             let found = uniform.covariance[(UNIFORM, UNIFORM)];
             assert!((found / variance - 1.0).abs() < 1e-6, "{found} {variance}");
+        }
+    }
+
+    /// The likelihood where each step is predicted by so many before it, step by step.
+    fn stepwise(
+        (rows, drones, order): (&Rows, usize, usize),
+        covariance: &Covariance,
+        own_mps: f64,
+        errors: &Common,
+    ) -> f64 {
+        let all = |of: std::ops::Range<usize>, with: std::ops::Range<usize>| {
+            DMatrix::from_fn(of.len(), with.len(), |row, column| {
+                let places = (of.start + row, with.start + column);
+                let (one, other) = (&rows.list[places.0], &rows.list[places.1]);
+                let noise = if places.0 == places.1 { one.noise_mps.powi(2) } else { 0.0 };
+                covariance.of(&one.spot, &other.spot) + noise
+            })
+        };
+        // Values, common errors, and each drone's constant.
+        let open = DMatrix::from_fn(rows.list.len(), 1 + COMMON + drones, |row, column| {
+            let row = &rows.list[row];
+            match column {
+                0 => row.value_mps,
+                common if common <= COMMON => row.common[common - 1],
+                drone => f64::from(u8::from(row.spot.drone == Some(drone - 1 - COMMON))),
+            }
+        });
+        let mut white = open.clone();
+        let mut ln_sd = 0.0;
+        for first in (0..rows.list.len()).step_by(drones) {
+            let (here, before) =
+                (first..first + drones, first.saturating_sub(order * drones)..first);
+            let (mut left, mut variance) =
+                (open.rows_range(here.clone()).into_owned(), all(here.clone(), here.clone()));
+            if !before.is_empty() {
+                let across = all(before.clone(), here.clone());
+                let factor = all(before.clone(), before.clone()).cholesky().unwrap();
+                let weights = factor.solve(&across).transpose();
+                left -= &weights * open.rows_range(before);
+                variance -= weights * across;
+            }
+            let factor = variance.cholesky().unwrap();
+            ln_sd += factor.l_dirty().diagonal().iter().map(|sd| sd.ln()).sum::<f64>();
+            factor.l_dirty().solve_lower_triangular_mut(&mut left);
+            white.rows_range_mut(here).copy_from(&left);
+        }
+        let errors = DMatrix::from_column_slice(COMMON, COMMON, errors.as_slice());
+        let mut spread = DMatrix::zeros(rows.list.len(), COMMON + drones);
+        spread.columns_mut(0, COMMON).copy_from(&(white.columns(1, COMMON) * errors));
+        spread
+            .columns_mut(COMMON, drones)
+            .copy_from(&(white.columns(1 + COMMON, drones) * own_mps));
+        let values = white.column(0);
+        let inner = spread.tr_mul(&spread) + DMatrix::identity(COMMON + drones, COMMON + drones);
+        let inner = inner.cholesky().unwrap();
+        let explained = spread.tr_mul(&values);
+        let square = values.norm_squared() - explained.dot(&inner.solve(&explained));
+        -ln_sd - inner.l_dirty().diagonal().iter().map(|sd| sd.ln()).sum::<f64>() - 0.5 * square
+    }
+
+    #[test]
+    fn steps_beyond_the_order_are_predicted_by_as_many_as_the_order_says() {
+        let drones = fleet(120);
+        let rows = Rows::of(&drones, 5, 10);
+        let steps = rows.seconds.len();
+        for drift_mps in [[0.0; 2], [1.5, -0.5]] {
+            let air = Air {
+                form: Form::Exponential,
+                sd_mps: 0.5,
+                length_m: 60.0,
+                stretch: [0.2, -0.1],
+                time_s: 90.0,
+                drift_mps,
+                gust_mps: 0.15,
+                gust_s: 5.0,
+                slow_mps: 0.1,
+                shared_mps: 0.03,
+            };
+            let covariance = Covariance::new(air).shown(0.03);
+            for order in [1, 3, steps - 2, steps - 1] {
+                let operations = 3.0 * 6.0_f64.powi(3) * (order as f64).powi(2) + 1.0;
+                let blocks = Blocks::of(&drones, &rows, Size { operations, ..SIZE }).unwrap();
+                assert_eq!((blocks.order, blocks.steps), (order, steps));
+                assert!(!blocks.varying.is_empty() && blocks.varying.len() < COMMON);
+                let system = blocks.system(&covariance, &[0.05; 6]).unwrap();
+                for factor in [
+                    Common::zeros(),
+                    Common::from_diagonal(&CommonVector::from_fn(|row, _| 0.5 + row as f64)),
+                ] {
+                    let expected = stepwise((&rows, 6, order), &covariance, 0.05, &factor);
+                    let found = system.posterior(&CommonVector::zeros(), &factor).unwrap();
+                    let found = found.log_likelihood;
+                    assert!(
+                        (found - expected).abs() < 1e-6 * expected.abs(),
+                        "{drift_mps:?} {order}: {found} {expected}"
+                    );
+                }
+            }
         }
     }
 

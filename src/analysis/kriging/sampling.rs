@@ -18,11 +18,11 @@ const POINTS: usize = 48;
 /// costs a tenth of the points. Numerical: of those tried it finds a ridge of three times the first guess and still has most
 /// points that count where the guess was right.
 const WIDER: [f64; 4] = [1.4, 1.6, 1.4, 1.2];
-/// A first guess of whose points this share counts is the posterior's shape, or nearly: one that is right has a fourth, drawn
-/// 1.4 times wider. Numerical.
+/// A first guess of whose points this share counts has the posterior's shape, or nearly: of a right one a quarter of them count,
+/// drawn 1.4 times wider. Numerical.
 const FITS: f64 = 0.2;
-/// By how much wider points are drawn then.
-const WIDER_OF_FITTING: [f64; 2] = [1.4, 1.2];
+/// By how much wider points are drawn after that.
+const WIDER_OF_FITTING: f64 = 1.2;
 /// Rounds then, at least.
 const LEAST_ROUNDS: usize = 3;
 /// Rounds go on, as the last of them, until so many points count. Numerical: an interval by 40 points is known to a tenth.
@@ -134,12 +134,13 @@ pub(super) fn samples<T: Send>(
     let mut ln_evidence = f64::NEG_INFINITY;
     let mut drawn: Vec<Drawn<T>> = Vec::new();
     let mut proposals: Vec<Proposal<'_>> = Vec::new();
-    let (mut wider_by, mut least_rounds): (&[f64], usize) = (&WIDER, WIDER.len());
+    let mut fits = false;
     for round in 0..MOST_ROUNDS {
+        let least_rounds = if fits { LEAST_ROUNDS } else { WIDER.len() };
         if round >= least_rounds && effective(&weights_of(&drawn)) > COUNT {
             break;
         }
-        let wider = wider_by[round.min(wider_by.len() - 1)];
+        let wider = if fits { WIDER_OF_FITTING } else { WIDER[round.min(WIDER.len() - 1)] };
         let shape = if round == 0 { Some(Shape::Split(found)) } else { next(&drawn, found) };
         proposals.extend(shape.map(|shape| Proposal { shape, wider }));
         let Some(proposal) = proposals.last() else { break };
@@ -153,8 +154,8 @@ pub(super) fn samples<T: Send>(
             .collect();
         drawn.extend(more);
         let sum = reweigh(&mut drawn, &proposals);
-        if round == 0 && effective(&weights_of(&drawn)) > FITS * POINTS as f64 {
-            (wider_by, least_rounds) = (&WIDER_OF_FITTING, LEAST_ROUNDS);
+        if round == 0 && !drawn.is_empty() {
+            fits = effective(&weights_of(&drawn)) > FITS * POINTS as f64;
         }
         ln_evidence = sum - ((proposals.len() * POINTS) as f64).ln();
     }

@@ -26,10 +26,6 @@ const LONGEST: f64 = 60.0;
 const LN_NOISE: (f64, f64) = (-18.0, 4.0);
 /// Modes that are filtered side by side. Numerical: each waits for its own division from block to block.
 const LANES: usize = 8;
-/// First step of the search for time and noise, logarithms: from a guess, ...
-const FAR: f64 = 0.4;
-/// ... and from those of a length nearby. Numerical.
-const NEAR: f64 = 0.15;
 /// A search by steps that has not ended by then will not.
 const MOST_STEPS: usize = 200;
 
@@ -182,12 +178,10 @@ impl Likelihood {
         let mut index = (((guess.0.ln() - first_guess) / STEP).round().max(0.0) as usize).min(last);
         let mut found: Vec<Option<Best>> = vec![None; self.grid.len()];
         let mut start = [guess.1.ln(), -4.0];
-        let mut step = FAR;
         let mut best = |index: usize, start: [f64; 2]| -> Option<Best> {
             let slot = found.get_mut(index)?;
             if slot.is_none() {
-                *slot = self.best(values, self.grid.get(index)?, start, step);
-                step = NEAR;
+                *slot = self.best(values, self.grid.get(index)?, start);
             }
             *slot
         };
@@ -256,13 +250,7 @@ impl Likelihood {
         ((0.1 * self.blocks.running as f64).max(0.5).ln(), (30.0 * self.length_s).ln())
     }
 
-    fn best(
-        &self,
-        values: &DMatrix<f64>,
-        modes: &Modes,
-        start: [f64; 2],
-        step: f64,
-    ) -> Option<Best> {
+    fn best(&self, values: &DMatrix<f64>, modes: &Modes, start: [f64; 2]) -> Option<Best> {
         let rotated = &modes.vectors * values;
         let (shortest, longest) = self.time_range();
         let inside =
@@ -272,7 +260,7 @@ impl Likelihood {
             let outside = (at[0] - near[0]).powi(2) + (at[1] - near[1]).powi(2);
             -self.profile(modes, &rotated, near).0 + 10.0 * outside
         };
-        let at = inside(minimum(loss, inside(start), step));
+        let at = inside(minimum(loss, inside(start)));
         let (log_likelihood, variance) = self.profile(modes, &rotated, at);
         let usable = log_likelihood.is_finite() && variance > 0.0;
         usable.then_some(Best { at, log_likelihood, variance })
@@ -494,7 +482,16 @@ mod tests {
         for row in &mut with_gap.rows {
             row[17..19].fill(f64::NAN);
         }
-        for field in [field(), with_gap] {
+        // More modes than are filtered side by side, and not a multiple of them.
+        let mut more = field();
+        let value = |drone: usize, second: usize| {
+            ((drone + 1) as f64 * (second as f64 + 2.0) * E).sin() + 0.02 * second as f64
+        };
+        for drone in more.rows.len()..LANES + 3 {
+            more.places.push([11.0 * drone as f64, 7.0 * (drone % 4) as f64]);
+            more.rows.push((0..SECONDS).map(|second| value(drone, second)).collect());
+        }
+        for field in [field(), with_gap, more] {
             let blocks = Blocks::of(&field).unwrap();
             for (slope, common) in [(false, false), (true, false), (false, true), (true, true)] {
                 let unknown = Unknown { slope, common };

@@ -1,18 +1,20 @@
 //! The smallest value of a smooth function of two variables.
 
+/// First step in each variable.
+const STEP: f64 = 0.4;
 /// The search ends when the values of the simplex differ by less than this.
 const TOLERANCE: f64 = 1e-4;
 /// More evaluations are not made.
 const MOST: usize = 200;
 
-/// Nelder and Mead's simplex, with this first step in each variable.
-pub(super) fn minimum(f: impl Fn([f64; 2]) -> f64, start: [f64; 2], step: f64) -> [f64; 2] {
+/// Nelder and Mead's simplex.
+pub(super) fn minimum(f: impl Fn([f64; 2]) -> f64, start: [f64; 2]) -> [f64; 2] {
     let value = |at: [f64; 2]| {
         let value = f(at);
         (at, if value.is_finite() { value } else { f64::MAX })
     };
     let mut simplex =
-        [value(start), value([start[0] + step, start[1]]), value([start[0], start[1] + step])];
+        [value(start), value([start[0] + STEP, start[1]]), value([start[0], start[1] + STEP])];
     let mut count = 3;
     while count < MOST {
         simplex.sort_by(|left, right| left.1.total_cmp(&right.1));

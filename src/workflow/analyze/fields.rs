@@ -23,7 +23,7 @@ pub(super) fn write_fields(
     wish: &Files,
 ) -> Result<(), WorkflowError> {
     let origin = origin(provenance, wish);
-    // Each compresses by itself what takes long to compress.
+    // They share no file, and each spends most of its time with compressing.
     let (drones, (netcdf, others)) = rayon::join(
         || write_drones(analysis, &origin, folder),
         || {

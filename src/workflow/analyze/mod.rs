@@ -10,6 +10,7 @@ mod held;
 mod outcome;
 mod settings;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use self::fields::{read_study, write_fields};
@@ -29,7 +30,7 @@ use crate::analysis::combine;
 use crate::analysis::lean_table::LeanTable;
 use crate::analysis::result::{Analysis, FlightAnalysis, LawsFrom, Yield};
 use crate::analysis::{AnalysisOptions, FlightInput, Warning, analyze};
-use crate::base::file::write_with;
+use crate::base::file::{FileError, write_with};
 use crate::base::json::write_json;
 use crate::base::plain::Shown as _;
 use crate::campaign;
@@ -293,6 +294,15 @@ impl Analysed {
         }
         let study = read_study(host, &self.root);
         let report_folder = folder.join("report");
+        // Nothing is written where something else would have to be left out later.
+        let inside = [report_folder.clone(), report_folder.join(report::FIGURES_FOLDER)];
+        let fields = campaign::fields_csv(folder).parent().map(Path::to_owned);
+        if let Some(file) =
+            inside.into_iter().chain(fields).find(|one| one.exists() && !one.is_dir())
+        {
+            let is_file = std::io::Error::from(std::io::ErrorKind::NotADirectory);
+            return Err(FileError::new("write into", &file, is_file).into());
+        }
         // The page tells the hash of the numbers, which are written while its figures are drawn; the tables are written beside it.
         let beside = Beside { study: study.as_ref(), basemap: self.basemap.as_ref() };
         let (hash, drawn) = rayon::join(
@@ -310,8 +320,11 @@ impl Analysed {
         let (page_made, fields_made) = rayon::join(
             || {
                 let made = drawn.page(&self.analysis, &provenance)?;
-                self.write_turbulence(folder, &report_folder, &provenance)?;
-                Ok::<_, WorkflowError>(report::write(&made, &report_folder)?)
+                let mut names = self.write_turbulence(folder, &report_folder, &provenance)?;
+                names.extend(made.figures.iter().map(|(name, _)| name.clone()));
+                report::write(&made, &report_folder)?;
+                report::remove_other_figures(&report_folder, &names);
+                Ok::<_, WorkflowError>(())
             },
             || write_fields(host, (&self.analysis, &provenance), folder, &self.files),
         );
@@ -320,22 +333,22 @@ impl Analysed {
         Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
     }
 
-    /// Writes the page of turbulence, or removes that of an earlier analysis.
+    /// Writes the page of turbulence, or removes that of an earlier analysis; names of its figures.
     fn write_turbulence(
         &self,
         folder: &Path,
         report_folder: &Path,
         provenance: &Provenance,
-    ) -> Result<(), WorkflowError> {
+    ) -> Result<BTreeSet<String>, WorkflowError> {
         let links = pages::of_turbulence(folder, &self.analysis);
         let provenance = Provenance { links, ..provenance.clone() };
-        if let Some(made) = report::render_turbulence(&self.analysis, &provenance)? {
-            report::write_named(&made, report_folder, report::TURBULENCE_PAGE)?;
-        } else {
+        let Some(made) = report::render_turbulence(&self.analysis, &provenance)? else {
             // Nothing to remove is the usual case.
             let _ = std::fs::remove_file(report_folder.join(report::TURBULENCE_PAGE));
-        }
-        Ok(())
+            return Ok(BTreeSet::new());
+        };
+        report::write_named(&made, report_folder, report::TURBULENCE_PAGE)?;
+        Ok(made.figures.into_iter().map(|(name, _)| name).collect())
     }
 
     /// Writes the figures of the report as papers print them.

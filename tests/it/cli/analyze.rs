@@ -54,6 +54,45 @@ fn an_estimate_without_errors_has_no_share_of_values_inside_of_them() {
 }
 
 #[test]
+fn figures_of_an_earlier_analysis_go_and_those_of_others_stay() {
+    let bench = Bench::new();
+    let run = ["run", "--direct", "--no-study", "--quiet", "--grid", "2x2", "--duration", "40"];
+    bench.expect(0, &[&run[..], &["-o", "flown"], SHORT].concat());
+    bench.expect(0, &["analyze", "flown", "-o", "out", "--quiet"]);
+    let figure = |name: &str| bench.path("out/report/figures").join(name);
+    assert!(figure("map-hover.svg").is_file() && figure("fig2-laws.svg").is_file());
+    fs::write(figure("sketch.svg"), "<svg xmlns=\"http://www.w3.org/2000/svg\"/>").unwrap();
+    fs::write(figure("notes.txt"), "mine").unwrap();
+    bench.expect(0, &["analyze", "flown/calibration", "-o", "out", "--quiet"]);
+    let page = fs::read_to_string(bench.path("out/report/index.html")).unwrap();
+    let mut left = Vec::new();
+    for entry in fs::read_dir(bench.path("out/report/figures")).unwrap() {
+        left.push(entry.unwrap().file_name().into_string().unwrap());
+    }
+    assert!(left.contains(&"sketch.svg".to_owned()) && left.contains(&"notes.txt".to_owned()));
+    let drawn: Vec<&String> = left.iter().filter(|name| name.starts_with("fig")).collect();
+    assert!(!drawn.is_empty() && !left.iter().any(|name| name.contains("hover")), "{left:?}");
+    for name in drawn {
+        assert!(page.contains(name.trim_end_matches(".svg")), "{name}");
+    }
+}
+
+#[test]
+fn where_a_file_is_in_the_way_nothing_is_written() {
+    let bench = Bench::new();
+    bench.fly();
+    for (place, file) in [("one", "report"), ("two", "fields"), ("three", "report/figures")] {
+        let path = bench.path(place).join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "in the way").unwrap();
+        let ended = bench.expect(1, &["analyze", "campaign", "-o", place, "--quiet"]);
+        let told = format!("failed to write into {place}/{file}");
+        assert!(ended.err.contains(&told), "{ended}");
+        assert!(!bench.path(place).join("analysis.json").exists());
+    }
+}
+
+#[test]
 fn a_study_that_cannot_be_read_is_told_and_left_out() {
     let bench = Bench::new();
     bench.fly();

@@ -29,15 +29,23 @@ enum Uncorrelated<'a> {
 impl<'a> Uncorrelated<'a> {
     fn new(rows: &Rows, neighbours: &'a Neighbours, covariance: &Covariance) -> Option<Self> {
         if !Whitening::is_of_all(rows) {
-            let pairs = Pairs::of(covariance, rows);
-            let each = neighbours.patterns.par_iter();
-            let weights: Option<Vec<Weights>> =
-                each.map(|pattern| weights(pattern, &pairs, true)).collect();
-            let weights = weights?;
-            let inverse = weights.iter().map(|weights| 1.0 / weights.variance.sqrt()).collect();
-            return Some(Self::Neighbours(neighbours, weights, inverse));
+            return Self::by_neighbours(rows, neighbours, covariance);
         }
         factor(&rows.list, covariance).map(Self::All)
+    }
+
+    fn by_neighbours(
+        rows: &Rows,
+        neighbours: &'a Neighbours,
+        covariance: &Covariance,
+    ) -> Option<Self> {
+        let pairs = Pairs::of(covariance, rows);
+        let each = neighbours.patterns.par_iter();
+        let weights: Option<Vec<Weights>> =
+            each.map(|pattern| weights(pattern, &pairs, true)).collect();
+        let weights = weights?;
+        let inverse = weights.iter().map(|weights| 1.0 / weights.variance.sqrt()).collect();
+        Some(Self::Neighbours(neighbours, weights, inverse))
     }
 
     /// Logarithm of what records are divided by.
@@ -175,5 +183,59 @@ impl<'a> Whitening<'a> {
     /// Logarithm of the density of a record, but for a constant.
     pub(super) fn log_density(&self, record: &White) -> f64 {
         self.ln_density - 0.5 * record.dot(record)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::kriging::covariance::Form;
+    use crate::analysis::kriging::covariance::tests::air;
+    use crate::analysis::kriging::data::{Drone, Value};
+    use crate::analysis::kriging::neighbours::{Reach, before};
+
+    #[test]
+    fn records_side_by_side_are_made_white_as_each_alone() {
+        let value = Value {
+            updraft_mps: 0.3,
+            law: std::array::from_fn(|_| 0.0),
+            doubts_mps: std::array::from_fn(|_| 0.0),
+            own_mps: 0.05,
+            noise_mps: 0.04,
+        };
+        let drone = |index: u32| Drone {
+            calibrated_m: None,
+            place_m: vec![[12.0 * f64::from(index % 3), 15.0 * f64::from(index / 3), 40.0]],
+            values: (0..120).map(|_| Some(value)).collect(),
+            slope_share: 0.0,
+            own_slope_share: 0.0,
+        };
+        let drones: Vec<Drone> = (0..6).map(drone).collect();
+        let rows = Rows::of(&drones, 5, 10);
+        let neighbours = before(&drones, &rows, Reach { beside: 3, step: 3, own: 2 });
+        let covariance = Covariance::new(air(Form::Exponential));
+        let uncorrelated = Uncorrelated::by_neighbours(&rows, &neighbours, &covariance).unwrap();
+        let Uncorrelated::Neighbours(_, weights, inverse) = &uncorrelated else {
+            panic!("by neighbours")
+        };
+        let n = rows.list.len();
+        for columns in [1, LANES, LANES + 3, 2 * LANES] {
+            let raw = DMatrix::from_fn(n, columns, |row, column| {
+                (0.7 * row as f64 + 1.3 * column as f64).sin()
+            });
+            let white = uncorrelated.white(raw.clone());
+            for (column, own) in raw.column_iter().enumerate() {
+                let alone = uncorrelated.white(DMatrix::from_column_slice(n, 1, own.as_slice()));
+                assert_eq!(white.column(column), alone.column(0), "{columns} {column}");
+                for row in 0..n {
+                    let pattern = neighbours.of[row];
+                    let near = weights[pattern].of.iter().zip(&neighbours.rows[row]);
+                    let expected: f64 =
+                        near.map(|(weight, near)| weight * own[*near as usize]).sum();
+                    let by_hand = (own[row] - expected) * inverse[pattern];
+                    assert!((white[(row, column)] - by_hand).abs() < 1e-12);
+                }
+            }
+        }
     }
 }
