@@ -400,7 +400,7 @@ fn all_minima(points: &[LawPoint], sigmas: &[f64]) -> Result<Minima, FitError> {
         minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
     };
     let mut minima: Vec<Solution> = minima_of(&chi2)
-        .map(|w_mps| bottom(w_mps, &at))
+        .map(|w_mps| bottom(w_mps, at))
         .filter_map(at)
         .filter(|(_, start)| start[0] > 0.0)
         .filter_map(|(_, start)| polish(start).ok())
