@@ -313,15 +313,15 @@ pub(super) fn beside_what_leans_tell(steps: &mut [Step], leans: Option<&Step>) {
     }
 }
 
-/// Names of what changes the pulse by more than the whole gap, us (rms), beside a finding that depends on the same: each takes
-/// away what the other one has too much, and what is left of both may be one thing that neither is. So either may be none.
+/// What changes the pulse by more than the whole gap, us (rms), beside a finding that depends on the same: each takes away what the
+/// other one has too much, and what is left of both may be one thing that neither is. So names are classes, and either may be none.
 pub(super) fn undone_by_another(steps: &mut [Step], gap_us: f64) {
     let first = |step: &Step| step.finding.effects().first().map(|&first| first.to_owned());
     let firsts: Vec<Option<String>> = steps.iter().map(first).collect();
     let mut undone = Vec::new();
     for (place, step) in steps.iter_mut().enumerate() {
-        let Some(effect) = lone_name(step).map(str::to_owned) else { continue };
-        let is_other = |other: &String| *other != effect && depend_on_the_same(&effect, other);
+        let Some(effect) = &firsts[place] else { continue };
+        let is_other = |other: &String| other != effect && depend_on_the_same(effect, other);
         let other = firsts.iter().position(|other| other.as_ref().is_some_and(is_other));
         if let Some(other) = other.filter(|_| step.size_us > UNDONE * gap_us) {
             doubt(step, firsts[other].clone());
@@ -701,6 +701,20 @@ mod tests {
         };
         assert_eq!(intervals(12.0), [(0.0, 1.0), (0.1, 0.4), (0.3 - 0.1, 0.3 + 0.1)]);
         assert_eq!(intervals(20.0)[0], (0.8, 1.0));
+        // Of what is a class already, too.
+        let both = ["thrust-curve".to_owned(), "face-drag".to_owned()];
+        let of = |effects: &[String], size_us: f64, value: f64| {
+            let finding =
+                Finding::Class { effects: effects.to_vec(), parameters: vec![size(value, None)] };
+            step(finding, 40.0, size_us, &[])
+        };
+        let turned = [both[1].clone(), both[0].clone()];
+        let mut steps = [of(&both, 10.0, 0.9), of(&turned, 21.0, 0.4)];
+        undone_by_another(&mut steps, 12.0);
+        for step in steps {
+            let Finding::Class { parameters, .. } = step.finding else { panic!("a class") };
+            assert_eq!(parameters[0].value.low, 0.0);
+        }
     }
 
     #[test]
