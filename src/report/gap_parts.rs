@@ -145,7 +145,7 @@ fn what_it_means(finding: &Finding) -> String {
              one would be a guess. {}",
             effects.len(),
             if parameters.is_empty() {
-                "None of them is in the model: with the first one it came no nearer to the drones that were held out."
+                "None of them is in the model."
             } else {
                 "The first one represents them in the model."
             }

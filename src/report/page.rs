@@ -64,9 +64,9 @@ pub struct Drawn {
 /// Draws the sections of the page.
 pub(super) fn draw(analysis: &Analysis, beside: Beside<'_>, format: Format) -> Drawn {
     let Beside { study, basemap } = beside;
-    let mut figures = Gallery { format, ..Gallery::default() };
+    let mut figures = Gallery::of(format);
     let section = |make: &(dyn Fn(&mut Gallery) -> Option<Value> + Sync)| {
-        let mut own = Gallery { format, ..Gallery::default() };
+        let mut own = Gallery::of(format);
         (make(&mut own), own)
     };
     let numbered = || analysis.flights.par_iter().enumerate();
@@ -139,7 +139,6 @@ pub(super) struct Gallery {
 
 impl Gallery {
     /// An empty one of figures for a format.
-    #[cfg(any(feature = "paper-figures", test))]
     pub(super) fn of(format: Format) -> Self {
         Self { format, ..Self::default() }
     }

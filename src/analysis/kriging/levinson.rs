@@ -483,6 +483,21 @@ mod tests {
 
     const SIZE: Size = Size { drones: 100, operations: 1e12 };
 
+    fn air(form: Form, drift_mps: [f64; 2]) -> Air {
+        Air {
+            form,
+            sd_mps: 0.5,
+            length_m: 60.0,
+            stretch: [0.2, -0.1],
+            time_s: 90.0,
+            drift_mps,
+            gust_mps: 0.15,
+            gust_s: 5.0,
+            slow_mps: 0.1,
+            shared_mps: 0.03,
+        }
+    }
+
     fn fleet(seconds: usize) -> Vec<Drone> {
         (0..6)
             .map(|index| {
@@ -541,19 +556,7 @@ mod tests {
             (Form::Gaussian, [1.5, -0.5]),
             (Form::Exponential, [1.5, -0.5]),
         ] {
-            let air = Air {
-                form,
-                sd_mps: 0.5,
-                length_m: 60.0,
-                stretch: [0.2, -0.1],
-                time_s: 90.0,
-                drift_mps,
-                gust_mps: 0.15,
-                gust_s: 5.0,
-                slow_mps: 0.1,
-                shared_mps: 0.03,
-            };
-            let covariance = Covariance::new(air).shown(0.03);
+            let covariance = Covariance::new(air(form, drift_mps)).shown(0.03);
             let drones = fleet(120);
             let rows = Rows::of(&drones, 5, 10);
             let blocks = Blocks::of(&drones, &rows, SIZE).unwrap();
@@ -643,19 +646,7 @@ mod tests {
         let rows = Rows::of(&drones, 5, 10);
         let steps = rows.seconds.len();
         for drift_mps in [[0.0; 2], [1.5, -0.5]] {
-            let air = Air {
-                form: Form::Exponential,
-                sd_mps: 0.5,
-                length_m: 60.0,
-                stretch: [0.2, -0.1],
-                time_s: 90.0,
-                drift_mps,
-                gust_mps: 0.15,
-                gust_s: 5.0,
-                slow_mps: 0.1,
-                shared_mps: 0.03,
-            };
-            let covariance = Covariance::new(air).shown(0.03);
+            let covariance = Covariance::new(air(Form::Exponential, drift_mps)).shown(0.03);
             for order in [1, 3, steps - 2, steps - 1] {
                 let operations = 3.0 * 6.0_f64.powi(3) * (order as f64).powi(2) + 1.0;
                 let blocks = Blocks::of(&drones, &rows, Size { operations, ..SIZE }).unwrap();
@@ -680,18 +671,7 @@ mod tests {
 
     #[test]
     fn a_field_that_is_remembered_is_the_one_that_is_asked_for() {
-        let air = Air {
-            form: Form::Exponential,
-            sd_mps: 0.5,
-            length_m: 60.0,
-            stretch: [0.2, -0.1],
-            time_s: 90.0,
-            drift_mps: [1.5, -0.5],
-            gust_mps: 0.15,
-            gust_s: 5.0,
-            slow_mps: 0.1,
-            shared_mps: 0.03,
-        };
+        let air = air(Form::Exponential, [1.5, -0.5]);
         let drones = fleet(120);
         let rows = Rows::of(&drones, 5, 10);
         let of = |blocks: &Blocks, air: Air| {

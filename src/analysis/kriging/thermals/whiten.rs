@@ -160,11 +160,7 @@ impl<'a> Whitening<'a> {
 
     /// A record made white.
     pub(super) fn white(&self, record: &[f64]) -> White {
-        let values = self.uncorrelated.white(DMatrix::from_column_slice(record.len(), 1, record));
-        let values = values.column(0).into_owned();
-        let mut explained = self.nuisance.tr_mul(&values);
-        self.information.l_dirty().solve_lower_triangular_mut(&mut explained);
-        White { values, explained }
+        self.all_white(DMatrix::from_column_slice(record.len(), 1, record)).swap_remove(0)
     }
 
     /// Several records made white, each in a column.
