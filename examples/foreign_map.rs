@@ -63,7 +63,7 @@ fn main() {
     }
 }
 
-const HEAD: &str = "                     zero  plain inside | found   bias  rest inside width means filled  rms |  limit   at it ratio | length time";
+const HEAD: &str = "                     zero  plain inside | found   bias  rest inside width means filled  rms |  limit holds   at it ratio | length time";
 
 /// What one campaign gave.
 #[derive(Clone, Copy, Default)]
@@ -80,6 +80,8 @@ struct Row {
     filled_rms: f64,
     filled_inside: f64,
     limit: f64,
+    /// Whether the best estimate's mean is within 1.96 of its own errors.
+    limit_holds: f64,
     at_limit: f64,
     length_inside: f64,
     time_inside: f64,
@@ -89,18 +91,19 @@ struct Row {
 impl Row {
     fn words(&self) -> String {
         let Self { zero, plain, rms, bias, rest, limit, at_limit, .. } = self;
-        let [plain_inside, inside, means, filled, length, time, scales] = [
+        let [plain_inside, inside, means, filled, limit_holds, length, time, scales] = [
             self.plain_inside,
             self.inside,
             self.means_inside,
             self.filled_inside,
+            self.limit_holds,
             self.length_inside,
             self.time_inside,
             self.has_scales,
         ]
         .map(|share| 100.0 * share);
         format!(
-            "{zero:6.3} {plain:6.3} {plain_inside:5.1} | {rms:6.3} {bias:6.3} {rest:5.3} {inside:5.1} {:5.2} {means:5.1} {filled:5.1} {:5.3} | {limit:6.3} \
+            "{zero:6.3} {plain:6.3} {plain_inside:5.1} | {rms:6.3} {bias:6.3} {rest:5.3} {inside:5.1} {:5.2} {means:5.1} {filled:5.1} {:5.3} | {limit:6.3} {limit_holds:5.1}  \
              {at_limit:6.3} {:5.2} | {length:4.0} {time:4.0} of {scales:3.0}",
             self.width,
             self.filled_rms,
@@ -128,6 +131,7 @@ impl Row {
             filled_rms: square(|row| row.filled_rms),
             filled_inside: mean(|row| row.filled_inside),
             limit: square(|row| row.limit),
+            limit_holds: mean(|row| row.limit_holds),
             at_limit: square(|row| row.at_limit),
             length_inside: mean(|row| row.length_inside) / scales,
             time_inside: mean(|row| row.time_inside) / scales,
@@ -202,6 +206,10 @@ fn row(folder: &Path, settings: &Settings) -> Result<Seen, Box<dyn Error>> {
         filled_inside: filled.iter().filter(|(_, inside)| *inside).count() as f64
             / filled.len() as f64,
         limit: truth.limit_rms_mps.unwrap_or(f64::NAN),
+        limit_holds: truth
+            .limit_rms_mps
+            .zip(truth.limit_se_mps)
+            .map_or(f64::NAN, |(rms, se)| f64::from(u8::from(rms <= 1.96 * se))),
         at_limit: truth.at_limit_rms_mps.unwrap_or(f64::NAN),
         length_inside: holds(
             scales.map(|scales| scales.length_m.interval),

@@ -224,6 +224,18 @@ pub(super) fn one(
     Ok(of_library(vehicle, comparison, updraft, |effect| effect == name)?.pop())
 }
 
+/// A vehicle with an effect of a size as a form of it, held against the same vehicle without; `None`: it cannot be flown so.
+///
+/// # Errors
+/// Effects of the vehicle without that are not valid.
+pub(super) fn form_of(
+    with: &Vehicle,
+    size: f64,
+    (vehicle, comparison): (&Vehicle, &Comparison),
+) -> Result<Option<Variant>, EffectError> {
+    Ok(Base::of(vehicle, comparison, Updraft::Same)?.forms(with, size).pop())
+}
+
 fn of_library(
     vehicle: &Vehicle,
     comparison: &Comparison,

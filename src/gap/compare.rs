@@ -372,6 +372,7 @@ impl Comparison {
         let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
+        let differing = self.differing(vehicle)?;
         Ok(self
             .data
             .groups
@@ -388,6 +389,14 @@ impl Comparison {
                     .or_else(|| mean(&pulses))
                     .unwrap_or_default();
                 let after_s = FLIGHTS_APART_S * of.flight as f64;
+                let in_hover = |values: &[f64]| {
+                    let bins = of.bins.iter().zip(values);
+                    let hovers =
+                        bins.filter(|(bin, _)| bin.kind.is_hover()).map(|(_, value)| value);
+                    mean(hovers).or_else(|| mean(values)).unwrap_or_default()
+                };
+                let slope_us: Vec<f64> = pulses.iter().map(|pulse| pulse - hover_us).collect();
+                let (offset, slope_us) = drones_differ(&differing, group, in_hover, slope_us);
                 GroupPattern {
                     drones: of.slots.len(),
                     time_s: of.bins.iter().map(|bin| after_s + bin.middle_s()).collect(),
@@ -400,7 +409,8 @@ impl Comparison {
                             [0, 1].map(|axis: usize| sides[axis][group][bin] / SIDE_STEP_MPS)
                         })
                         .collect(),
-                    slope_us: pulses.iter().map(|pulse| pulse - hover_us).collect(),
+                    offset,
+                    slope_us,
                 }
             })
             .collect())
@@ -589,6 +599,25 @@ impl Comparison {
         Ok(doubts)
     }
 
+    /// What each way in which the vehicle lets drones differ changes of the pulse, by one standard deviation, by group and bin, us.
+    fn differing(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let of = |(effect, parameter, size): &(String, String, f64)| {
+            let mut spread = vehicle.clone();
+            select::set(&mut spread, effect, parameter, *size);
+            let scene = self.scene_of(vehicle);
+            let (without, mut with) =
+                (scene.deviating(&spread, "")?, scene.deviating(&spread, effect)?);
+            for ((with, without), group) in with.iter_mut().zip(&without).zip(&self.data.groups) {
+                let drones = group.slots.len().max(1) as f64;
+                for (with, without) in with.iter_mut().zip(without) {
+                    *with = (*with - without) * drones.sqrt();
+                }
+            }
+            Ok(with)
+        };
+        self.spreads.iter().map(of).collect()
+    }
+
     /// Standard deviation of the pulse from drone to drone by what makes them differ in the model, in the air and at
     /// the climbs of this flight, us.
     ///
@@ -731,6 +760,50 @@ impl Reading {
     }
 }
 
+/// How drones of a group differ: what changes a drone's pulse by 1 us in hover, and what a relative error of its response does, us.
+/// Of what the vehicle lets them differ in, that which changes hovers most, and much the same everywhere, and that which changes others
+/// beside hovers most; otherwise an offset, and `slope_us`.
+fn drones_differ(
+    differing: &[Vec<Vec<f64>>],
+    group: usize,
+    in_hover: impl Fn(&[f64]) -> f64,
+    slope_us: Vec<f64>,
+) -> (Vec<f64>, Vec<f64>) {
+    let rms =
+        |values: &[f64]| mean(values.iter().map(|value| value * value)).unwrap_or_default().sqrt();
+    let ways = differing.iter().filter_map(|way| way.get(group));
+    // What goes with the climb more than it changes hovers is no offset.
+    let is_offset = |way: &&Vec<f64>| {
+        let hover_us = in_hover(way);
+        let beside: Vec<f64> = way.iter().map(|value| value - hover_us).collect();
+        hover_us.abs() > LEAST_DOUBT_US && rms(&beside) < 0.5 * hover_us.abs()
+    };
+    let offsets = ways.clone().filter(is_offset);
+    let most = offsets.max_by(|a, b| in_hover(a).abs().total_cmp(&in_hover(b).abs()));
+    let offset: Vec<f64> = most
+        .map(|way| {
+            let hover_us = in_hover(way);
+            way.iter().map(|value| value / hover_us).collect()
+        })
+        .unwrap_or_default();
+    let beside = ways.filter(|way| most.is_none_or(|most| *way != most)).map(|way| {
+        let hover_us = in_hover(way);
+        let at = |bin: usize| offset.get(bin).copied().unwrap_or(1.0);
+        let each = way.iter().enumerate().map(|(bin, value)| value - hover_us * at(bin));
+        each.collect::<Vec<f64>>()
+    });
+    let beside = beside.max_by(|a, b| rms(a).total_cmp(&rms(b)));
+    let slope_us = match beside.filter(|beside| rms(beside) > LEAST_DOUBT_US) {
+        Some(beside) => {
+            // As large as a relative error of the whole response.
+            let times = rms(&slope_us) / rms(&beside);
+            beside.iter().map(|value| value * times).collect()
+        }
+        None => slope_us,
+    };
+    (offset, slope_us)
+}
+
 /// What makes a vehicle's drones differ: effect, parameter, and its size.
 fn spreads(vehicle: &Vehicle) -> Vec<(String, String, f64)> {
     let mut found = Vec::new();
@@ -861,6 +934,30 @@ fn rectified(
 mod tests {
     use super::super::trial;
     use super::*;
+
+    #[test]
+    fn drones_differ_as_the_vehicle_lets_them() {
+        let in_hover = |values: &[f64]| values[0];
+        let differ = |ways: &[[f64; 3]]| {
+            let ways: Vec<Vec<Vec<f64>>> = ways.iter().map(|way| vec![way.to_vec()]).collect();
+            drones_differ(&ways, 0, in_hover, vec![0.0, 30.0, -40.0])
+        };
+        assert_eq!(differ(&[]), (vec![], vec![0.0, 30.0, -40.0]));
+        // Thrust changes hovers most; of inflow, what is no offset counts, as large as that of the whole response.
+        let (thrust, inflow) = ([4.0, 4.4, 3.8], [1.0, 4.1, -3.05]);
+        for ways in [[thrust, inflow], [inflow, thrust]] {
+            let (offset, slope_us) = differ(&ways);
+            assert_eq!(offset, [1.0, 1.1, 0.95]);
+            assert!((slope_us[1] - 30.0).abs() < 1e-9 && (slope_us[2] + 40.0).abs() < 1e-9);
+            assert_eq!(slope_us[0], 0.0);
+        }
+        // In an updraft inflow changes hovers as well.
+        let (offset, slope_us) = differ(&[[5.0, 8.0, 1.0], thrust]);
+        assert!(offset == [1.0, 1.1, 0.95] && slope_us[1] > 0.0, "{offset:?} {slope_us:?}");
+        assert_eq!(differ(&[[5.0, 12.0, -4.0]]).0, [0.0; 0], "and is no offset alone");
+        let (offset, slope_us) = differ(&[thrust]);
+        assert_eq!((offset.len(), slope_us), (3, vec![0.0, 30.0, -40.0]), "one way is the offset");
+    }
 
     #[test]
     fn who_leans_otherwise_leant_in_another_wind() {

@@ -432,7 +432,7 @@ mod tests {
     fn who_is_held_against_others_needs_half_of_what_finds_it() {
         let case = case();
         let alone = Options {
-            only: Some(Only { effect: "one", updraft_mps: 0.0, beaten_nats: 0.0 }),
+            only: Some(Only { effect: "one", updraft_mps: 0.0, beaten_nats: 0.0, is_bent: false }),
             ..BY_FLOORS
         };
         let is_taken = |gain| {

@@ -78,12 +78,13 @@ impl Blup {
             let air = square(OWN) * (-apart_s / hyper.get(SHARED_TIME)).exp()
                 + square(GUSTS) * (-apart_s / hyper.get(GUST_TIME)).exp();
             responses[a] * responses[b] * air
-                + square(OFFSETS)
+                + square(OFFSETS) * pattern.offset_at(a) * pattern.offset_at(b)
                 + square(SLOPES) * pattern.slope_us[a] * pattern.slope_us[b]
                 + if a == b { square(WHITE) } else { 0.0 }
         });
-        let cross = DMatrix::from_fn(count, 2, |bin, which| {
-            if which == 0 { square(OFFSETS) } else { square(SLOPES) * pattern.slope_us[bin] }
+        let cross = DMatrix::from_fn(count, 2, |bin, which| match which {
+            0 => square(OFFSETS) * pattern.offset_at(bin),
+            _ => square(SLOPES) * pattern.slope_us[bin],
         });
         let map = covariance
             .cholesky()

@@ -1,10 +1,12 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
+mod bent;
 pub(super) mod form;
 mod in_updraft;
 mod look;
 pub(super) mod telling;
 
+use bent::Bent;
 pub(in crate::gap) use look::Seen;
 use look::{In, Look};
 use telling::{along_its_signal, finding, lean_parameter, rest, rivals, told_once, with_alike};
@@ -62,6 +64,8 @@ pub struct Only {
     pub updraft_mps: f64,
     /// How well the flight is explained without, nats.
     pub beaten_nats: f64,
+    /// Whether it is looked for only where it bends the response as another updraft does.
+    pub is_bent: bool,
 }
 
 impl Only {
@@ -277,6 +281,7 @@ impl<'a> Setting<'a> {
             comparison,
             refused: Vec::new(),
             last: None,
+            bent: None,
         }
     }
 }
@@ -320,6 +325,8 @@ struct Search<'a> {
     refused: Vec<&'static str>,
     /// The state before the last free shape, and how probable that was.
     last: Option<(Found, f64)>,
+    /// The curve that is looked for where it bends the response as another updraft does.
+    bent: Option<Bent>,
 }
 
 impl Search<'_> {
@@ -481,6 +488,9 @@ impl Search<'_> {
             found.vehicle = next;
             found.noise = best.noise.clone();
             found.refit(comparison)?;
+            if let Some(bent) = self.bent.take() {
+                bent.taken_by(found, candidate.name);
+            }
         } else {
             found.extras.push(variant.column.clone());
             found.noise = best.noise.clone();
@@ -690,7 +700,8 @@ mod tests {
 
     #[test]
     fn an_effect_that_explains_far_less_is_not_flown() {
-        let only = Only { effect: "battery", updraft_mps: 0.0, beaten_nats: -1000.0 };
+        let only =
+            Only { effect: "battery", updraft_mps: 0.0, beaten_nats: -1000.0, is_bent: false };
         assert!(only.is_out_of_reach(-1151.0) && !only.is_out_of_reach(-1150.0));
     }
 
@@ -703,7 +714,8 @@ mod tests {
         let explained_nats = Found::nothing(comparison.clone()).explains().unwrap();
         let looks = |more_nats: f64| {
             let beaten_nats = explained_nats + more_nats;
-            let only = Some(Only { effect: "battery", updraft_mps: 0.0, beaten_nats });
+            let only =
+                Some(Only { effect: "battery", updraft_mps: 0.0, beaten_nats, is_bent: false });
             let options = Options { only, most_steps: 1, rest: false, ..Options::default() };
             let given = (&simulated, &options, &flights);
             let mut search = begun(&data, &vehicle, given, comparison.clone());

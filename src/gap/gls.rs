@@ -361,10 +361,11 @@ impl<'a> Problem<'a> {
                 shift_mps,
                 bent_us,
                 side_response,
+                offset,
                 slope_us,
             } = group;
             digest.add(*drones as u64);
-            for values in [time_s, height_m, shift_mps, bent_us, slope_us] {
+            for values in [time_s, height_m, shift_mps, bent_us, offset, slope_us] {
                 digest.add_all(values);
             }
             digest.add_all(response.iter().flat_map(Response::values));
@@ -697,7 +698,8 @@ mod tests {
                 if (g, d) == (h, e) {
                     let quickly = (-apart_s / hyper.get(GUST_TIME)).exp();
                     sum += answers * (square(OWN) * slowly + square(GUSTS) * quickly);
-                    sum += square(OFFSETS) + square(SLOPES) * a.slope_us[k] * b.slope_us[l];
+                    sum += square(OFFSETS) * a.offset_at(k) * b.offset_at(l);
+                    sum += square(SLOPES) * a.slope_us[k] * b.slope_us[l];
                     sum += square(PULSE_NOISE) * (-apart_s / 5.0).exp();
                 }
                 if one == other {
@@ -778,10 +780,19 @@ mod tests {
                 *response = Response::of(|shift_mps| 20.0 * shift_mps + 9.0 * shift_mps.powi(2));
             }
         }
+        for group in &mut curved {
+            group.offset = group.time_s.iter().map(|time_s| 1.0 + 0.1 * time_s.cos()).collect();
+        }
         problem.groups = &curved;
         let mut hyper = Hyper::default();
         hyper.0[SHARED] += 2.6;
-        for likelihood in [Likelihood::Profile, Likelihood::Restricted] {
+        // Where bins hardly scatter, drones differ by more than that.
+        let mut quiet = hyper;
+        quiet.0[WHITE] = f64::ln(0.2);
+        let each = [Likelihood::Profile, Likelihood::Restricted];
+        for (hyper, likelihood) in
+            each.map(|one| (hyper, one)).into_iter().chain([(quiet, each[0])])
+        {
             let slopes = problem.at(&hyper).slopes(&curved, likelihood);
             let prior = hyper.prior_slopes();
             for (place, (slope, prior)) in slopes.iter().zip(prior).enumerate() {

@@ -86,8 +86,9 @@ pub(super) fn fewer_instead(
     effects.sort_by_key(|effect| !known.iter().any(|one| one == effect));
     let (updraft_mps, nats) = (found.updraft_mps, found.explains()?);
     let by = |only: Only| alone(options, only);
-    let each =
-        effects.into_iter().map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats }));
+    let each = effects
+        .into_iter()
+        .map(|effect| by(Only { effect, updraft_mps, beaten_nats: nats, is_bent: false }));
     let all: Vec<Options> = each.chain([nothing]).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
@@ -114,7 +115,8 @@ const WIND_READERS: [Role; 2] = [Role::BodyDragTop, Role::RotorDrag];
 /// One effect in place of nothing, where it explains a flight clearly better in the updraft and the wind that go with it. In a
 /// strong wind that was read without a drag, what nobody knows of that wind hides the drag, and so it may where a drag, or an effect of
 /// the climb, explains enough to be named and moves the pulse by too little; and a shape of the climb that could
-/// not be taken in may be an effect in another updraft. An effect with which the raw gap falls by half need not explain it
+/// not be taken in may be an effect in another updraft. A curve of the thrust is always asked for where it bends the response as
+/// another updraft does. An effect with which the raw gap falls by half need not explain it
 /// clearly better. `flown` searches with these options, and `rest` looks for what is left.
 ///
 /// # Errors
@@ -133,18 +135,23 @@ pub(super) fn effect_after_all(
     let is_misread = wind.measured.is_none()
         && (is_strong_wind(wind.mean_mps) || passes && (reads_wind || is_like_drag));
     let is_left = passes && Dependence::of(&end.candidate) == Some(Dependence::Climb);
-    if !found.steps.is_empty() || !options.updraft || !(is_misread || is_left) {
+    if !found.steps.is_empty() || !options.updraft {
         return Ok(found);
     }
+    let is_hinted = is_misread || is_left;
     let drags = WIND_READERS.iter().filter(|_| is_misread).filter_map(|role| role.place());
     let mut effects: Vec<&'static str> = drags.map(|place| place.name()).collect();
     add_new(&mut effects, shapes().filter(|name| is_left && depends_on_climb(name)));
+    if !is_hinted {
+        add_new(&mut effects, Role::ThrustExpo.place().map(|place| place.name()));
+    }
     let bins = comparison.data.bins_of_groups();
     let price_nats = if is_left { FREE_FLOOR_NATS } else { FLOOR_NATS };
     let (updraft_mps, without_nats) = (found.updraft_mps, found.explains()?);
     let raw_us = comparison.raw_gap_us()?;
     let ended = |effect: &&'static str| {
-        let only = Only { effect, updraft_mps, beaten_nats: without_nats + price_nats };
+        let beaten_nats = without_nats + price_nats;
+        let only = Only { effect, updraft_mps, beaten_nats, is_bent: !is_hinted };
         Ended::of(&alone(options, only), &bins, &flown)
     };
     let is_better = |it: &Ended| {
@@ -586,7 +593,10 @@ mod tests {
             nothing.rest = Rest { candidate, gain_nats, threshold_nats: 8.0, ..Rest::default() };
             let flown = |options: &Options| {
                 let mut there = Found::nothing(trial::comparison(&data));
-                there.steps = vec![step(options.only.unwrap().effect, 20.0, &[])];
+                let only = options.only.unwrap();
+                if !only.is_bent {
+                    there.steps = vec![step(only.effect, 20.0, &[])];
+                }
                 Ok(Searched { found: there, left: None })
             };
             let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
@@ -625,7 +635,8 @@ mod tests {
             nothing.rest = Rest { gain_nats, candidate, threshold_nats: 14.0, ..Rest::default() };
             let asked = std::sync::Mutex::new(Vec::new());
             let flown = |options: &Options| {
-                asked.lock().unwrap().push(options.only.unwrap().effect);
+                let Only { effect, is_bent, .. } = options.only.unwrap();
+                asked.lock().unwrap().push(if is_bent { "bent" } else { effect });
                 Ok(Searched { found: Found::nothing(trial::comparison(&data)), left: None })
             };
             let none_left = |_: &Options, _: Left| unreachable!("nothing is left");
@@ -635,8 +646,13 @@ mod tests {
         };
         let effects = tried("climb", 15.0);
         assert!(effects.contains(&"vortex-ring") && effects.contains(&"thrust-curve"));
+        assert!(
+            !effects.contains(&"bent"),
+            "in each updraft, not only where it bends the response"
+        );
         assert!(!effects.contains(&"density"), "of the height");
-        assert_eq!(tried("climb", 14.0), [""; 0], "chance gains as much");
-        assert_eq!(tried("height", 40.0), [""; 0]);
+        // A curve may bend the response as another updraft does, whatever is left.
+        assert_eq!(tried("climb", 14.0), ["bent"], "chance gains as much");
+        assert_eq!(tried("height", 40.0), ["bent"]);
     }
 }

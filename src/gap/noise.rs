@@ -3,11 +3,11 @@
 //! The data model (docs/physics.md, 3.2): drone i in bin k of its group reads
 //!
 //! ```text
-//! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + H_k h(t_k) + p_i(t_k) + e
+//! y = mean + a_i o_k + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + H_k h(t_k) + p_i(t_k) + e
 //! ```
 //!
 //! with W the updraft that all share (it may change with height), X a slow updraft of the drone's own place,
-//! g its gusts, a its hover pulse, b its relative response, S the model's response to vertical air speed in
+//! g its gusts, a its hover pulse, b its relative response, o and r what these are at a climb, S the model's response to vertical air speed in
 //! gusts as strong as this noise has them, s0 what it is at least, h the horizontal gusts that are not known
 //! and H the model's response to them, p noise of the drone's pulse that some seconds remember. Within a command group the likelihood splits exactly into the group's
 //! mean and the deviations of its drones; both are whitened by filters.
@@ -147,6 +147,8 @@ pub struct GroupPattern {
     pub bent_us: Vec<f64>,
     /// The model's response to horizontal air speed along either axis of the show, us/(m/s); empty: none.
     pub side_response: Vec<[f64; 2]>,
+    /// Change of the pulse in each bin by what changes it by 1 us in hover; empty: the same in all.
+    pub offset: Vec<f64>,
     /// Change of the pulse by a relative error of the response, in each bin, us.
     pub slope_us: Vec<f64>,
 }
@@ -164,6 +166,10 @@ pub(super) struct Whitener {
     pub log_det: f64,
 }
 
+/// How each drone differs from the others is described no better than to this, us, in each bin: an offset and a slope are not all of it,
+/// and in still air, where bins repeat to a tenth of a microsecond, what they leave over would choose updrafts and names by hundreds of
+/// nats. Chosen: a fiftieth of a metre per second on a show drone.
+const DIFFER_US: f64 = 0.5;
 /// States of the filter of the means: shared air, its gradient, the bend, two side gusts, the bend's
 /// wandering, the curvature in height.
 const SHARED_STATES: usize = 7;
@@ -189,6 +195,11 @@ impl GroupPattern {
     /// Height of a bin in units of the gradient.
     pub fn aloft(&self, bin: usize) -> f64 {
         (self.height_m[bin] - MIDDLE_M) / ALOFT_M
+    }
+
+    /// Change of the pulse in a bin by what changes it by 1 us in hover.
+    pub fn offset_at(&self, bin: usize) -> f64 {
+        self.offset.get(bin).copied().unwrap_or(1.0)
     }
 
     /// Response to vertical air speed in each bin, in this noise, us/(m/s).
@@ -258,7 +269,7 @@ impl Whitener {
             LooksAt::from_slice(&[
                 (first, response),
                 (first + 1, response),
-                (first + 2, 1.0),
+                (first + 2, groups[index].offset_at(bin)),
                 (first + 3, groups[index].slope_us[bin]),
                 (first + 4, 1.0),
             ])
@@ -296,7 +307,7 @@ impl Whitener {
             let observations = bins.map(|bin| Observation {
                 time_s: group.time_s[bin],
                 looks_at: looks(index, bin, 0),
-                noise: white,
+                noise: white.max(DIFFER_US * DIFFER_US),
             });
             Filter::new(own_states(hyper, 1.0).to_vec(), observations.collect())
         };
@@ -414,8 +425,10 @@ impl Whitener {
             each.map(|(seen, slope)| 2.0 * seen.noise * slope).sum()
         };
         by[WHITE] += of_noise(&self.means, means);
-        for (filter, slopes) in self.deviations.iter().zip(deviations) {
-            by[WHITE] += of_noise(filter, slopes);
+        if hyper.get(WHITE) > DIFFER_US {
+            for (filter, slopes) in self.deviations.iter().zip(deviations) {
+                by[WHITE] += of_noise(filter, slopes);
+            }
         }
         // By the response to what all share and to each drone's own air.
         let mut shared: Vec<Vec<f64>> =
@@ -545,6 +558,7 @@ mod tests {
             time_s: (0..6).map(|bin| first + 20.0 * f64::from(bin)).collect(),
             height_m: (0..6).map(|bin| 10.0 + 15.0 * f64::from(bin)).collect(),
             response: vec![Response::straight(20.0); 6],
+            offset: Vec::new(),
             slope_us: vec![0.0; 6],
             ..GroupPattern::default()
         }

@@ -84,6 +84,7 @@ pub(super) fn patterns() -> Vec<GroupPattern> {
         time_s: (0..6).map(|bin| first_s + 20.0 * f64::from(bin)).collect(),
         height_m: (0..6).map(|bin| 10.0 + 15.0 * f64::from(bin)).collect(),
         response: (0..6).map(|bin| Response::straight(15.0 + 2.0 * f64::from(bin))).collect(),
+        offset: Vec::new(),
         slope_us: (0..6).map(|bin| 12.0 * f64::from(bin % 3) - 9.0).collect(),
         ..GroupPattern::default()
     };

@@ -19,6 +19,8 @@ const RESET: &str = "\u{1b}[0m";
 
 /// A smaller updraft is printed as none, m/s.
 const LEAST_UPDRAFT_MPS: f64 = 0.005;
+/// An updraft of zero that is known no better than to this is worth a word, m/s.
+const WIDE_MPS: f64 = 0.5;
 /// Rivals that are shown of each step.
 const RIVALS: usize = 4;
 
@@ -150,8 +152,8 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
 /// The updraft of the whole flight, which the sizes and the gap depend on.
 fn air(page: &mut Page, verdict: &Verdict) {
     let updraft_mps = verdict.noise.updraft_mps;
-    if updraft_mps.abs() >= LEAST_UPDRAFT_MPS {
-        let half = verdict.noise.updraft_half_mps;
+    let half = verdict.noise.updraft_half_mps;
+    if updraft_mps.abs() >= LEAST_UPDRAFT_MPS || half.is_some_and(|half| half > WIDE_MPS) {
         let within = half.map_or_else(String::new, |half| format!(" ± {half:.2}"));
         let told = format!(
             "Air: the whole flight is explained best in a uniform updraft of {}{within} m/s{}",

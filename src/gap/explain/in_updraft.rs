@@ -11,6 +11,7 @@ use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
 use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
 use super::{Found, In, Look, MOST_GUSTS_MPS, Only, SAME_GUSTS_MPS, Search};
+use crate::vehicle::Vehicle;
 
 impl Search<'_> {
     /// What is left in the updraft in which one effect explains the flight best: an updraft that was settled in without
@@ -24,8 +25,12 @@ impl Search<'_> {
         // Without the effect, an updraft in which it is none may explain more than any in which it is one does at first.
         let mut best: Option<((bool, f64), Look, Comparison, Found)> = None;
         let mut is_far = false;
+        let bent = self.bends_most(only.effect, only.updraft_mps);
         let mut starts = [&[0.0, only.updraft_mps], &UPDRAFTS_MPS[..]].concat();
         starts.dedup();
+        if only.is_bent {
+            starts.clear();
+        }
         for updraft_mps in starts {
             (self.comparison, self.found) = (first.clone(), begin.clone());
             self.found.updraft_mps = updraft_mps;
@@ -45,6 +50,17 @@ impl Search<'_> {
             if best.as_ref().is_none_or(|(most, ..)| by > *most) {
                 best = Some((by, look, self.comparison.clone(), self.found.clone()));
             }
+        }
+        let most = best.as_ref().map_or(f64::NEG_INFINITY, |((_, most), ..)| *most);
+        if let Some(bent) = bent.filter(|bent| bent.nats > most && bent.nats > only.beaten_nats) {
+            (self.comparison, self.found) = (first.clone(), begin.clone());
+            if let Some(look) = self.look_where_it_bends(bent)? {
+                return Ok(Some(look));
+            }
+        }
+        if only.is_bent {
+            (self.comparison, self.found) = (first, begin);
+            return Ok(None);
         }
         let Some((_, look, comparison, found)) = best else {
             (self.comparison, self.found) = (first, begin);
@@ -260,30 +276,13 @@ impl Search<'_> {
     }
 
     fn fitted_in(&self, updraft_mps: f64, noise: Start) -> Option<f64> {
-        let Found { vehicle, parameters, .. } = &self.found;
+        let Found { vehicle, parameters, gusts_mps, .. } = &self.found;
         let there = self.flown_in(updraft_mps).ok()?;
         if there.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
             return None;
         }
         let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
-        let known = doubts.get(1..).unwrap_or_default();
-        let share = updraft_mps / UPDRAFT_DOUBT_MPS;
-        let known_nats = there.lean_misfit_nats() + 0.5 * share * share;
-        let (mut noise, mut gusts) = (noise, self.found.gusts_mps);
-        // The gusts of a noise bend the model's curve, so twice.
-        for is_last in [false, true] {
-            let patterns = there.patterns(vehicle, gusts).ok()?;
-            let residual = Split::of(&there.residual(vehicle, gusts).ok()?);
-            let problem = Problem::new(&patterns, &residual).doubting(known);
-            let fit = problem.fit(noise, Likelihood::Profile);
-            let next = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
-            if is_last || (next - gusts).abs() < SAME_GUSTS_MPS {
-                let likely = settled(&problem, fit, |_| patterns.clone()).1.log_posterior();
-                return likely.is_finite().then_some(likely - known_nats);
-            }
-            (noise, gusts) = (Start::from(&fit), next);
-        }
-        None
+        likely_if(&there, vehicle, &doubts, (noise, *gusts_mps))
     }
 
     /// Whether the flight may have been in another updraft. A table has the climb that was flown, not the one
@@ -385,6 +384,33 @@ impl Search<'_> {
         self.found.updraft_mps = before_mps;
         Ok(Some(best.unwrap_or(here)))
     }
+}
+
+/// How likely a flight is if a vehicle flew it in just the updraft of a comparison, nats, beside what else is doubted, from a noise
+/// and its gusts (m/s); `None`: the vehicle cannot fly so.
+pub(super) fn likely_if(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    doubts: &[Column],
+    (mut noise, mut gusts): (Start, f64),
+) -> Option<f64> {
+    let known = doubts.get(1..).unwrap_or_default();
+    let share = comparison.scene.updraft_mps / UPDRAFT_DOUBT_MPS;
+    let known_nats = comparison.lean_misfit_nats() + 0.5 * share * share;
+    // The gusts of a noise bend the model's curve, so twice.
+    for is_last in [false, true] {
+        let patterns = comparison.patterns(vehicle, gusts).ok()?;
+        let residual = Split::of(&comparison.residual(vehicle, gusts).ok()?);
+        let problem = Problem::new(&patterns, &residual).doubting(known);
+        let fit = problem.fit(noise, Likelihood::Profile);
+        let next = gusts_mps(&fit.hyper).min(MOST_GUSTS_MPS);
+        if is_last || (next - gusts).abs() < SAME_GUSTS_MPS {
+            let likely = settled(&problem, fit, |_| patterns.clone()).1.log_posterior();
+            return likely.is_finite().then_some(likely - known_nats);
+        }
+        (noise, gusts) = (Start::from(&fit), next);
+    }
+    None
 }
 
 /// How the most of something is looked for beside a start, m/s.
@@ -513,17 +539,17 @@ fn climbed(fit: &impl Fn(&Start, f64) -> Option<InUpdraft>, start: InUpdraft) ->
 }
 
 /// A flight taken in an updraft, and what explains most of it there.
-struct InUpdraft {
+pub(super) struct InUpdraft {
     updraft_mps: f64,
     solution: Solution,
     likely: f64,
     /// Updraft that explains most, as far as the slopes at this one tell, m/s.
-    most_mps: f64,
+    pub(super) most_mps: f64,
 }
 
 impl InUpdraft {
     /// `None`: the vehicle cannot fly so.
-    fn fitted(
+    pub(super) fn fitted(
         comparison: &Comparison,
         patterns: &[GroupPattern],
         found: &Found,
@@ -567,7 +593,7 @@ fn better(one: InUpdraft, other: InUpdraft) -> InUpdraft {
 const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
-const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
+pub(super) const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
 /// How the updraft of the likeliest flight is found: down to half of what a flight tells of it at best. Numerical.
 const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03, parabolas: 6 };
 /// The same with what was found already: rougher, as all sizes are fitted anew where it leads to.
@@ -585,7 +611,7 @@ const SAME_FLIGHT_NATS: f64 = 1.0;
 const SAME_FLIGHT_MPS: f64 = 0.25;
 /// A raw gap that is larger by this factor is that of a model in the wrong updraft. Chosen: the air that all drones share
 /// makes more or less of it by chance.
-const NEAR: f64 = 1.1;
+pub(super) const NEAR: f64 = 1.1;
 /// A side of still air whose best start explains less by this much is left alone, nats. Chosen: far more than
 /// [`SAME_NATS`], as starts are no tops.
 const OTHER_SIDE_NATS: f64 = 100.0;
@@ -593,9 +619,9 @@ const OTHER_SIDE_NATS: f64 = 100.0;
 /// Numerical.
 const FLOWN_ROUNDS: usize = 2;
 /// Rounds in which the updraft settles, at most. Numerical.
-const UPDRAFT_ROUNDS: usize = 6;
+pub(super) const UPDRAFT_ROUNDS: usize = 6;
 /// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
-const UPDRAFT_STEP_MPS: f64 = 1.0;
+pub(super) const UPDRAFT_STEP_MPS: f64 = 1.0;
 /// By how much less likely a flight may become where its updraft is flown, nats: what the drones' answers to gusts
 /// make of it there. Chosen, three times [`super::WORSE_NATS`].
 const SAME_NATS: f64 = 6.0;
@@ -673,7 +699,7 @@ mod tests {
     #[test]
     fn an_updraft_in_which_an_effect_is_out_of_reach_is_left_out() {
         let looks = |beaten_nats: f64| {
-            let only = Only { effect: "battery", updraft_mps: 0.0, beaten_nats };
+            let only = Only { effect: "battery", updraft_mps: 0.0, beaten_nats, is_bent: false };
             let (seen, _) = in_air(0.6, |search| {
                 search.look_where_it_explains_most(only).unwrap().map(|look| look.explained().nats)
             });

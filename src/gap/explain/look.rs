@@ -64,6 +64,8 @@ pub(super) struct Look {
     pub candidates: Vec<Candidate>,
     pub generics: Vec<Generic>,
     drones: Vec<usize>,
+    /// How well the flight is explained, nats above the threshold, where that is known of what is sought already.
+    pub by_form_nats: Option<f64>,
     /// What explains how much, once it is computed.
     round: OnceLock<Round>,
 }
@@ -82,8 +84,9 @@ impl Look {
     pub(super) fn explained(&self) -> Explained {
         let round = self.round();
         let by_effect = (round.best() - FLOOR_NATS).max(0.0);
+        let nats = round.base.log_posterior() - self.seen.lean_misfit_nats + by_effect;
         Explained {
-            nats: round.base.log_posterior() - self.seen.lean_misfit_nats + by_effect,
+            nats: self.by_form_nats.map_or(nats, |by_form| nats.max(by_form)),
             lacks_effect: by_effect > 0.0,
             lacks_shape: round.best_generic() > FREE_FLOOR_NATS,
         }
@@ -197,7 +200,7 @@ impl Search<'_> {
             generics = all(&comparison.scene, &comparison.headings());
         }
         let drones = comparison.data.counts();
-        Ok(Look { seen, candidates, generics, drones, round: OnceLock::new() })
+        Ok(Look { seen, candidates, generics, drones, by_form_nats: None, round: OnceLock::new() })
     }
 }
 
@@ -217,7 +220,7 @@ mod tests {
         let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
         let flights = ModelFlights::default();
         let look = |effect: &'static str, gusts_mps: f64| {
-            let only = Some(Only { effect, updraft_mps: 0.0, beaten_nats: 0.0 });
+            let only = Some(Only { effect, updraft_mps: 0.0, beaten_nats: 0.0, is_bent: false });
             let options = Options { only, ..Options::default() };
             let given = (&simulated, &options, &flights);
             let mut search = begun(&data, &vehicle, given, comparison.clone());

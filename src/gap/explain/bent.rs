@@ -1,0 +1,209 @@
+//! A curve of the thrust beside the updraft of the whole flight: both bend the response.
+//!
+//! Without a curve, another updraft can stand for it, and from there no line leads to both: the noise without the curve is larger, and a
+//! curve of another size no multiple of one. So size and updraft are fitted together, by the closed forms, from afar.
+
+use rayon::prelude::*;
+
+use super::super::candidates::{Updraft, form_of, one};
+use super::super::compare::Comparison;
+use super::super::error::GapError;
+use super::super::gls::Start;
+use super::super::refine::{self, Parameter, slopes};
+use super::super::search::FLOOR_NATS;
+use super::in_updraft::{
+    InUpdraft, NEAR, UPDRAFT_ROUNDS, UPDRAFT_STEP_MPS, UPDRAFTS_MPS, likely_if,
+};
+use super::{Found, Look, Search};
+use crate::effects::Role;
+use crate::vehicle::Vehicle;
+
+/// A step of the updraft that needs no further round, m/s. Numerical.
+const SETTLED_MPS: f64 = 0.02;
+/// How often the model with the curve is flown where closed forms lead to. Numerical: they are off by some tenths of a metre per second
+/// from afar.
+const FLIGHTS: usize = 3;
+
+/// A curve fitted together with the updraft.
+#[derive(Clone, Debug)]
+pub(super) struct Bent {
+    effect: &'static str,
+    vehicle: Vehicle,
+    size: f64,
+    updraft_mps: f64,
+    noise: Start,
+    gusts_mps: f64,
+    /// What the model with the curve, flown, leaves, us.
+    raw_us: f64,
+    /// How well the flight is explained, nats above the threshold.
+    pub nats: f64,
+}
+
+impl Bent {
+    /// Gives findings the curve as it was fitted together with the updraft, where it was taken up.
+    pub(super) fn taken_by(self, found: &mut Found, effect: &str) {
+        if effect == self.effect {
+            found.vehicle = self.vehicle;
+            found.noise = self.noise;
+            found.gusts_mps = self.gusts_mps;
+        }
+    }
+}
+
+impl Search<'_> {
+    /// The curve and the updraft that explain the flight best, from some updrafts; `None`: the effect is no curve of the thrust, the
+    /// model has one, it can fly in none of them, or without a curve it is as near to the logs in one of them or in another, m/s.
+    pub(super) fn bends_most(&self, effect: &'static str, other_mps: f64) -> Option<Bent> {
+        if !Role::ThrustExpo.is_of(effect) || Role::ThrustExpo.is_on(&self.found.vehicle) {
+            return None;
+        }
+        let bent = |start_mps: &f64| self.bent_from(effect, *start_mps);
+        let found: Vec<Bent> = UPDRAFTS_MPS.par_iter().filter_map(bent).collect();
+        let best =
+            found.into_iter().reduce(|best, one| if one.nats > best.nats { one } else { best })?;
+        let without_us = |mps: &f64| self.flown_in(*mps).ok()?.raw_gap_us().ok();
+        let updrafts_mps = [&[0.0, other_mps], &UPDRAFTS_MPS[..]].concat();
+        let nearest_us = updrafts_mps.iter().filter_map(without_us).fold(f64::INFINITY, f64::min);
+        (best.raw_us * NEAR < nearest_us).then_some(best)
+    }
+
+    fn bent_from(&self, effect: &'static str, start_mps: f64) -> Option<Bent> {
+        let flown = self.flown_in(start_mps).ok()?;
+        if flown.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
+            return None;
+        }
+        let candidate = one(&self.found.vehicle, &flown, Updraft::Same, effect).ok()??;
+        let size = candidate.size?;
+        let nearest = candidate
+            .variants
+            .iter()
+            .min_by(|a, b| (a.size - size.usual).abs().total_cmp(&(b.size - size.usual).abs()));
+        let vehicle = nearest?.vehicle.clone()?;
+        let parameter = Parameter {
+            effect,
+            name: size.name,
+            unit: size.unit,
+            bounds: (size.low, size.high),
+            before: None,
+        };
+        let mut found = Found { vehicle, parameters: vec![parameter], ..self.found.clone() };
+        found.noise = Start::default();
+        let mut there = flown;
+        for _ in 0..FLIGHTS {
+            let updraft_mps = settles(&mut found, &there)?;
+            there = self.flown_with(&found.vehicle, updraft_mps)?;
+        }
+        let doubts = refine::doubts(&there, &found.vehicle, &found.parameters).ok()?;
+        let noise = (found.noise.clone(), found.gusts_mps);
+        let likely = likely_if(&there, &found.vehicle, &doubts, noise)?;
+        let (size, _) = *found.values.first()?;
+        Some(Bent {
+            effect,
+            vehicle: found.vehicle,
+            size,
+            updraft_mps: there.scene.updraft_mps,
+            noise: found.noise,
+            gusts_mps: found.gusts_mps,
+            raw_us: there.raw_gap_us().ok()?,
+            nats: likely - FLOOR_NATS,
+        })
+    }
+
+    /// The comparison with another vehicle, flown in an updraft, m/s; `None`: it cannot fly the same bins there.
+    fn flown_with(&self, vehicle: &Vehicle, updraft_mps: f64) -> Option<Comparison> {
+        let Self { data, simulated, plan, comparison, .. } = self;
+        let there =
+            Comparison::of(data, vehicle, simulated, *plan, updraft_mps, Some(comparison)).ok()?;
+        let is_alike = there.data.bins_of_groups() == comparison.data.bins_of_groups();
+        is_alike.then(|| there.spread_as(self.vehicle))
+    }
+
+    /// What is left in the updraft of a curve, with that curve among what may explain it; `None`: the model without it cannot
+    /// fly the same flight there.
+    pub(super) fn look_where_it_bends(&mut self, bent: Bent) -> Result<Option<Look>, GapError> {
+        let bins = self.comparison.data.bins_of_groups();
+        self.found.updraft_mps = bent.updraft_mps;
+        self.found.was_in_updraft = true;
+        match self.against_model() {
+            Ok(there) if there.data.bins_of_groups() == bins => self.comparison = there,
+            _ => return Ok(None),
+        }
+        let mut look = self.look_at_beginning()?;
+        let form = form_of(&bent.vehicle, bent.size, (&self.found.vehicle, &self.comparison))?;
+        for candidate in look.candidates.iter_mut().filter(|one| one.name == bent.effect) {
+            candidate.variants.extend(form.clone());
+        }
+        look.by_form_nats = Some(bent.nats);
+        self.bent = Some(bent);
+        Ok(Some(look))
+    }
+}
+
+/// Fits a curve's size and the updraft beside a flight, by closed forms: that updraft, m/s; `None`: the vehicle cannot fly so.
+fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
+    let mut updraft_mps = flown.scene.updraft_mps;
+    for _ in 0..UPDRAFT_ROUNDS {
+        let there = flown.clone().in_updraft(updraft_mps);
+        found.refit(&there).ok()?;
+        let patterns = there.patterns(&found.vehicle, found.gusts_mps).ok()?;
+        let free = slopes(&there, &found.vehicle, &found.parameters).ok()?;
+        let here = InUpdraft::fitted(&there, &patterns, found, &free, &found.noise, updraft_mps)?;
+        let step_mps = here.most_mps - updraft_mps;
+        updraft_mps += step_mps.clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+        if step_mps.abs() < SETTLED_MPS {
+            break;
+        }
+    }
+    Some(updraft_mps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::compare::Simulated;
+    use super::super::super::model_flights::ModelFlights;
+    use super::super::super::trial;
+    use super::super::Options;
+    use super::super::tests::begun;
+    use super::*;
+    use crate::effects::{Model, Signals};
+
+    /// The vehicle with a curve of the thrust.
+    fn bent(expo: f64) -> Vehicle {
+        let mut vehicle = trial::vehicle();
+        Role::ThrustExpo.set(&mut vehicle, expo);
+        vehicle
+    }
+
+    #[test]
+    fn a_curve_is_found_together_with_its_updraft() {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let [plain, with] = [&vehicle, &bent(0.4)].map(|one| Model::of(one).unwrap());
+        let pulse_us = |model: &Model, climb_mps: f64| {
+            let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+            model.pulse_us(&Signals { climb_mps, ..here })
+        };
+        let data = trial::data(4, |drone, bin| {
+            let climb_mps = bin.climb_mps();
+            let ripple_us = 0.1 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+            pulse_us(&with, climb_mps + 1.6) - pulse_us(&plain, climb_mps) + ripple_us
+        });
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let (options, flights) = (Options::default(), ModelFlights::default());
+        let given = (&simulated, &options, &flights);
+        let mut search = begun(&data, &vehicle, given, comparison);
+        let curve = Role::ThrustExpo.place().unwrap().name();
+        let found = search.bends_most(curve, 0.0).unwrap();
+        let off = (found.size - 0.4, found.updraft_mps + 1.6);
+        assert!(off.0.abs() < 0.05 && off.1.abs() < 0.15, "{} {}", found.size, found.updraft_mps);
+        let nats = found.nats;
+        let look = search.look_where_it_bends(found).unwrap().unwrap();
+        assert!(look.explained().nats >= nats);
+        assert!(search.bends_most("battery", 0.0).is_none(), "no curve");
+        // A model that has a curve is held against its own.
+        let known = bent(0.4);
+        let comparison = Comparison::new(&data, &known, &simulated, None).unwrap();
+        let flights = ModelFlights::default();
+        let search = begun(&data, &known, (&simulated, &options, &flights), comparison);
+        assert!(search.bends_most(curve, 0.0).is_none());
+    }
+}
