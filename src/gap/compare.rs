@@ -373,8 +373,8 @@ impl Comparison {
         let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
-        // In a wind that is known so badly, so is what it makes of a drone's thrust.
-        let is_known = !is_strong_wind(self.wind.mean_mps);
+        // In a wind that is known so badly, so is what it makes of a drone's thrust; and of ArduPilot's frame the law of leaning is only near.
+        let is_known = !is_strong_wind(self.wind.mean_mps) && vehicle.airframe.sitl.is_none();
         let differing = if is_known { self.differing(vehicle)? } else { Vec::new() };
         Ok(self
             .data
