@@ -17,7 +17,6 @@ use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
 use super::scene::Scene;
 use super::stand_in::{as_flown, own_wind};
-use super::verdict::is_strong_wind;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::effects::{EffectError, Reference, Role, find, select};
 use crate::mission::plan::Plan;
@@ -373,9 +372,7 @@ impl Comparison {
         let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
-        // In a wind that is known so badly, so is what it makes of a drone's thrust; and of ArduPilot's frame the law of leaning is only near.
-        let is_known = !is_strong_wind(self.wind.mean_mps) && vehicle.airframe.sitl.is_none();
-        let differing = if is_known { self.differing(vehicle)? } else { Vec::new() };
+        let differing = self.differing(vehicle)?;
         Ok(self
             .data
             .groups
@@ -387,17 +384,14 @@ impl Comparison {
                     mean(drones.map(|drone| closed.at(group, drone, bin))).unwrap_or_default()
                 };
                 let pulses: Vec<f64> = (0..of.bins.len()).map(pulse).collect();
-                let hovers = of.bins.iter().zip(&pulses).filter(|(bin, _)| bin.kind.is_hover());
-                let hover_us = mean(hovers.map(|(_, pulse_us)| pulse_us))
-                    .or_else(|| mean(&pulses))
-                    .unwrap_or_default();
-                let after_s = FLIGHTS_APART_S * of.flight as f64;
                 let in_hover = |values: &[f64]| {
                     let bins = of.bins.iter().zip(values);
                     let hovers =
                         bins.filter(|(bin, _)| bin.kind.is_hover()).map(|(_, value)| value);
                     mean(hovers).or_else(|| mean(values)).unwrap_or_default()
                 };
+                let hover_us = in_hover(&pulses);
+                let after_s = FLIGHTS_APART_S * of.flight as f64;
                 let slope_us: Vec<f64> = pulses.iter().map(|pulse| pulse - hover_us).collect();
                 let (offset, slope_us) = drones_differ(&differing, group, in_hover, slope_us);
                 GroupPattern {

@@ -788,7 +788,7 @@ mod tests {
         hyper.0[SHARED] += 2.6;
         // Where bins hardly scatter, drones differ by more than that.
         let mut quiet = hyper;
-        quiet.0[WHITE] = f64::ln(0.2);
+        quiet.0[WHITE] = f64::ln(0.1);
         let each = [Likelihood::Profile, Likelihood::Restricted];
         for (hyper, likelihood) in
             each.map(|one| (hyper, one)).into_iter().chain([(quiet, each[0])])

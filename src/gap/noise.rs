@@ -168,8 +168,9 @@ pub(super) struct Whitener {
 
 /// How each drone differs from the others is described no better than to this, us, in each bin: an offset and a slope are not all of it,
 /// and in still air, where bins repeat to a tenth of a microsecond, what they leave over would choose updrafts and names by hundreds of
-/// nats. Chosen: a fiftieth of a metre per second on a show drone.
-const DIFFER_US: f64 = 0.5;
+/// nats. Chosen, of 0.2, 0.5, 1 and 2: twice what they leave over there; with 0.5 a drag was found in ArduPilot's frame in strong wind where
+/// nothing was hidden.
+const DIFFER_US: f64 = 0.2;
 /// States of the filter of the means: shared air, its gradient, the bend, two side gusts, the bend's
 /// wandering, the curvature in height.
 const SHARED_STATES: usize = 7;
