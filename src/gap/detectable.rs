@@ -1,6 +1,7 @@
 //! Power of a flight: the smallest size of each effect that it would have named.
 
 use super::candidates::{Candidate, Updraft, Variant, library};
+use super::compare::Comparison;
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Column, Problem, Solution, Split, White};
@@ -18,6 +19,9 @@ const SAME: f64 = 0.9;
 /// A trace this small is not excited by the flight, us at the usual size: a fiftieth of the pulse that is
 /// material. Chosen.
 const NOTHING_US: f64 = 0.05;
+/// Other updrafts that a flight may have been in, from the one that it is explained in, m/s: as far as the search goes, in steps
+/// between which little changes.
+const BESIDE_MPS: [f64; 10] = [0.2, -0.2, 0.4, -0.4, 0.7, -0.7, 1.2, -1.2, 2.0, -2.0];
 
 /// The table for everything in the library, with the final model and noise.
 ///
@@ -43,13 +47,15 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let solution = free_but(None);
     let candidates = library(&found.vehicle, comparison, Updraft::Same)?;
     let drones = comparison.data.counts();
+    let elsewhere = elsewhere(comparison, &found.vehicle)?;
     let best: Vec<(&Candidate, Option<Trace>)> = candidates
         .iter()
         .map(|candidate| {
             let is_found = found.parameters.iter().any(|one| one.effect == candidate.name);
             let own = is_found.then(|| free_but(Some(candidate.name)));
             let form = usual_form(candidate.name, &found.vehicle);
-            (candidate, strongest(candidate, form, own.as_ref().unwrap_or(&solution), &drones))
+            let solution = own.as_ref().unwrap_or(&solution);
+            (candidate, strongest(candidate, form, solution, (&drones, &elsewhere)))
         })
         .collect();
     let mut table = Vec::new();
@@ -75,20 +81,20 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
         else {
             continue;
         };
-        let (Some(size), Some((white, per_size, us))) = (candidate.size, trace) else {
+        let (Some(size), Some(trace)) = (candidate.size, trace) else {
             table.push(nothing("the vehicle cannot have it"));
             continue;
         };
-        let usual_z = per_size * size.usual.abs();
-        let smallest = (2.0 * FLOOR_NATS).sqrt() / per_size;
+        let usual_z = trace.z(size.usual.abs());
+        let smallest = trace.smallest((2.0 * FLOOR_NATS).sqrt());
         let like: Vec<String> = best
             .iter()
             .filter(|(other, _)| other.name != candidate.name)
             .filter_map(|(other, trace)| Some((other, trace.as_ref()?)))
-            .filter(|(_, (other, ..))| solution.likeness(white, other).abs() > SAME)
+            .filter(|(_, other)| solution.likeness(&trace.white, &other.white).abs() > SAME)
             .map(|(other, _)| other.name.to_owned())
             .collect();
-        let excited = us * size.usual.abs() > NOTHING_US;
+        let excited = trace.us * size.usual.abs() > NOTHING_US;
         let reach = smallest.is_finite() && smallest <= size.high && excited;
         let why = if !excited {
             "this flight does not excite it: its trace is below a twentieth of a microsecond"
@@ -112,8 +118,57 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     Ok(table)
 }
 
-/// A form whitened, its z and its trace (us) per unit of the size.
-type Trace = (White, f64, f64);
+/// What a flight shows of an effect.
+struct Trace {
+    /// A form of it, whitened.
+    white: White,
+    /// Its z per unit of the size in the updraft that the flight is explained in.
+    per_size: f64,
+    /// What each other updraft does to the flight.
+    beside: Vec<Beside>,
+    /// How much it changes the pulse, us per unit of the size.
+    us: f64,
+}
+
+/// What another updraft does to a flight besides what the slope of the response tells.
+struct Beside {
+    /// How far that is from what noise explains, as a Fisher z.
+    z: f64,
+    /// What it has in common with an effect, z per unit of its size.
+    along: f64,
+}
+
+impl Trace {
+    /// Fisher z of a size: what tells it from a flight without the effect in whichever updraft is most like it.
+    fn z(&self, size: f64) -> f64 {
+        let here = self.per_size * size;
+        let apart2 = |one: &Beside| {
+            let across2 = (one.z * one.z - one.along * one.along).max(0.0);
+            across2 + (here - one.along).powi(2)
+        };
+        self.beside.iter().map(apart2).fold(here * here, f64::min).max(0.0).sqrt()
+    }
+
+    /// The size from which this z is reached whichever updraft the flight was in.
+    fn smallest(&self, z: f64) -> f64 {
+        let needed = |one: &Beside| {
+            let across2 = (one.z * one.z - one.along * one.along).max(0.0);
+            (across2 < z * z).then(|| one.along + (z * z - across2).sqrt())
+        };
+        self.beside.iter().filter_map(needed).fold(z, f64::max) / self.per_size
+    }
+}
+
+/// What other updrafts of the whole flight do to the pulse, us.
+fn elsewhere(comparison: &Comparison, vehicle: &Vehicle) -> Result<Vec<Column>, GapError> {
+    let here = comparison.pulses_by_lean(vehicle)?;
+    let there = |by_mps: &f64| {
+        let there = comparison.clone().in_updraft(comparison.scene.updraft_mps + by_mps);
+        // Where the vehicle cannot fly, it was not.
+        Some(there.pulses_by_lean(vehicle).ok()?.less(&here))
+    };
+    Ok(BESIDE_MPS.iter().filter_map(there).collect())
+}
 
 /// The form in which a vehicle has an effect if nothing else is said, of those that are tried; `None`: it has one.
 fn usual_form(effect: &str, vehicle: &Vehicle) -> Option<f64> {
@@ -123,18 +178,18 @@ fn usual_form(effect: &str, vehicle: &Vehicle) -> Option<f64> {
     forms.iter().copied().min_by(|a, b| (a - usual).abs().total_cmp(&(b - usual).abs()))
 }
 
-/// How a flight shows a candidate best in this form, whitened, its z and its trace (us) per unit of the size. Of another form the
-/// flight may show more, or nothing: a vortex ring that begins in a slower descent is met where that of the usual onset is not.
+/// How a flight shows a candidate best in this form. Of another form the flight may show more, or nothing: a vortex ring that begins
+/// in a slower descent is met where that of the usual onset is not.
 fn strongest(
     candidate: &Candidate,
     form: Option<f64>,
     solution: &Solution,
-    drones: &[usize],
+    (drones, elsewhere): (&[usize], &[Column]),
 ) -> Option<Trace> {
     let now = candidate.size.map_or(0.0, |size| size.now);
     let is_usual = |variant: &&Variant| form.is_none() || variant.form == form;
     let has_usual = candidate.variants.iter().any(|variant| is_usual(&variant));
-    candidate
+    let (white, per_size, variant, by) = candidate
         .variants
         .iter()
         .filter(|variant| !has_usual || is_usual(variant))
@@ -142,7 +197,15 @@ fn strongest(
             let white = solution.white(&variant.column);
             let by = (variant.size - now).abs().max(1e-12);
             let per_size = solution.information(&white).max(0.0).sqrt() / by;
-            (white, per_size, variant.column.spread(drones) / by)
+            (white, per_size, variant, by)
         })
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let beside = elsewhere.iter().map(|column| {
+        let other = solution.white(column);
+        let z = solution.information(&other).max(0.0).sqrt();
+        Beside { z, along: z * solution.likeness(&white, &other) }
+    });
+    let beside = beside.collect();
+    let us = variant.column.spread(drones) / by;
+    Some(Trace { white, per_size, beside, us })
 }

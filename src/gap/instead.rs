@@ -138,20 +138,18 @@ pub(super) fn effect_after_all(
     if !found.steps.is_empty() || !options.updraft {
         return Ok(found);
     }
-    let is_hinted = is_misread || is_left;
     let drags = WIND_READERS.iter().filter(|_| is_misread).filter_map(|role| role.place());
     let mut effects: Vec<&'static str> = drags.map(|place| place.name()).collect();
     add_new(&mut effects, shapes().filter(|name| is_left && depends_on_climb(name)));
-    if !is_hinted {
-        add_new(&mut effects, Role::ThrustExpo.place().map(|place| place.name()));
-    }
+    let hinted = effects.clone();
+    add_new(&mut effects, Role::ThrustExpo.place().map(|place| place.name()));
     let bins = comparison.data.bins_of_groups();
     let price_nats = if is_left { FREE_FLOOR_NATS } else { FLOOR_NATS };
     let (updraft_mps, without_nats) = (found.updraft_mps, found.explains()?);
     let raw_us = comparison.raw_gap_us()?;
     let ended = |effect: &&'static str| {
         let beaten_nats = without_nats + price_nats;
-        let only = Only { effect, updraft_mps, beaten_nats, is_bent: !is_hinted };
+        let only = Only { effect, updraft_mps, beaten_nats, is_bent: !hinted.contains(effect) };
         Ended::of(&alone(options, only), &bins, &flown)
     };
     let is_better = |it: &Ended| {

@@ -542,7 +542,8 @@ fn climbed(fit: &impl Fn(&Start, f64) -> Option<InUpdraft>, start: InUpdraft) ->
 pub(super) struct InUpdraft {
     updraft_mps: f64,
     solution: Solution,
-    likely: f64,
+    /// How likely the flight is there, nats but for a constant.
+    pub(super) likely: f64,
     /// Updraft that explains most, as far as the slopes at this one tell, m/s.
     pub(super) most_mps: f64,
 }
