@@ -78,6 +78,8 @@ pub enum Magnitude {
     Value,
     /// The value is the magnitude, of either sign.
     EitherSign,
+    /// The value is what grows to the magnitude, of either sign, by the end of the flight: per time that the effect counts by.
+    AtTheEnd,
     /// The value is the magnitude, negative with this probability.
     Negative(f64),
     /// The magnitude is the slope of the pulse by climb at hover, us/(m/s).
@@ -134,6 +136,12 @@ fn stream_of(name: &str) -> u64 {
         |list: &[HiddenKind]| list.iter().position(|kind| kind.name == name).map(|at| at as u64);
     let on_request = || place(ON_REQUEST).map(|at| FIRST_ON_REQUEST + at);
     1 + place(KINDS).or_else(on_request).unwrap_or(0)
+}
+
+/// Time that an effect counts its change by, where it has one, s.
+pub(super) fn counted_by_s(effect: &str, known: &Vehicle) -> Option<f64> {
+    let effect = find(effect)?;
+    effect.definition().parameter("time_s").map(|parameter| (parameter.default)(known))
 }
 
 /// A number drawn uniformly from 0 to 1.
@@ -213,6 +221,9 @@ impl HiddenKind {
         let value = match self.magnitude {
             Magnitude::Value => magnitude,
             Magnitude::EitherSign => sign * magnitude,
+            Magnitude::AtTheEnd => {
+                sign * magnitude * counted_by_s(self.effect, &known).unwrap_or(flight_s) / flight_s
+            }
             Magnitude::Negative(_) if size.is_some() => sign * magnitude,
             Magnitude::Negative(chance) => {
                 if unit(rng) < chance {
@@ -257,8 +268,9 @@ impl HiddenKind {
     /// Size in words: where it can be of either sign, with the one that it has.
     fn words(&self, magnitude: f64, value: f64) -> String {
         match self.magnitude {
-            Magnitude::EitherSign | Magnitude::Negative(_) => {
-                format!("{value:+.3} {}", self.unit.replace(", of either sign", ""))
+            Magnitude::EitherSign | Magnitude::Negative(_) | Magnitude::AtTheEnd => {
+                let signed = magnitude.copysign(value);
+                format!("{signed:+.3} {}", self.unit.replace(", of either sign", ""))
             }
             _ => format!("{magnitude:.3} {}", self.unit),
         }
@@ -321,7 +333,10 @@ impl HiddenKind {
     fn allowed(&self, size: f64) -> Result<f64, BlindError> {
         let (low, high) = self.range;
         let (least, most) = (low / SIZES_BELOW, high * SIZES_ABOVE);
-        let has_sign = matches!(self.magnitude, Magnitude::EitherSign | Magnitude::Negative(_));
+        let has_sign = matches!(
+            self.magnitude,
+            Magnitude::EitherSign | Magnitude::Negative(_) | Magnitude::AtTheEnd
+        );
         let magnitude = if has_sign { size.abs() } else { size };
         if (least..=most).contains(&magnitude) {
             return Ok(magnitude);
@@ -453,7 +468,15 @@ mod tests {
             for (seed, base) in (0..20).flat_map(|seed| kind.bases.iter().map(move |b| (seed, *b)))
             {
                 let hidden = kind.draw(seed, base, Protocol::Paper, 14.0).unwrap();
-                let magnitude = hidden.value().abs();
+                // What grows is stated for the time that the effect counts by, and drawn by the end of the flight.
+                let by_the_end = match kind.magnitude {
+                    Magnitude::AtTheEnd => {
+                        let known = base.known().unwrap();
+                        Protocol::Paper.length_s() / counted_by_s(kind.effect, &known).unwrap()
+                    }
+                    _ => 1.0,
+                };
+                let magnitude = by_the_end * hidden.value().abs();
                 assert!((kind.range.0..=kind.range.1).contains(&magnitude), "{hidden:?}");
                 let mut vehicle = base.known().unwrap();
                 for (name, value) in &hidden.parameters {
@@ -466,5 +489,12 @@ mod tests {
             kind_of(name).unwrap().draw(7, Base::Airsim, Protocol::Paper, 14.0).unwrap().value()
         };
         assert!(draw("battery-overcompensated") < 0.0);
+        let drift = kind_of("response-drift").unwrap();
+        let sized =
+            drift.draw_sized(7, Base::Airsim, Protocol::Enhanced, 14.0, Some(-9.0)).unwrap();
+        let of_600_s = -9.0 * 600.0 / Protocol::Enhanced.length_s();
+        assert!((sized.value() - of_600_s).abs() < 1e-12, "{sized:?}");
+        assert_eq!(sized.words, "-9.000 us/(m/s) at the end");
+        assert!(!sized.parameters.contains_key("time_s"), "the model's own");
     }
 }

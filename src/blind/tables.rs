@@ -137,8 +137,7 @@ pub const ON_REQUEST: &[HiddenKind] = &[
     },
     library("momentum-drag", "per_s", (0.15, 0.4), "1/s"),
     HiddenKind {
-        magnitude: Magnitude::EitherSign,
-        also: &[("time_s", Also::FlightTime)],
+        magnitude: Magnitude::AtTheEnd,
         ..library("response-drift", "slope_us", (3.0, 12.0), "us/(m/s) at the end, of either sign")
     },
     HiddenKind {

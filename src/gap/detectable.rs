@@ -209,3 +209,42 @@ fn strongest(
     let us = variant.column.spread(drones) / by;
     Some(Trace { white, per_size, beside, us })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+
+    fn trace(beside: Vec<Beside>) -> Trace {
+        Trace { white: White::default(), per_size: 2.0, beside, us: 1.0 }
+    }
+
+    #[test]
+    fn an_updraft_that_does_the_same_hides_a_size() {
+        let alone = trace(Vec::new());
+        assert!((alone.z(5.0) - 10.0).abs() < 1e-12);
+        assert!((alone.smallest(4.0) - 2.0).abs() < 1e-12);
+        // Another updraft is nearly what a size of 5 does, and nothing of what it leaves is seen.
+        let hidden = trace(vec![Beside { z: 10.0, along: 10.0 }]);
+        assert!(hidden.z(5.0) < 1e-12 && (hidden.z(2.0) - 4.0).abs() < 1e-12);
+        assert!((hidden.smallest(4.0) - 7.0).abs() < 1e-12);
+        // What only that updraft does tells it, and one that does the contrary is none.
+        let told = trace(vec![Beside { z: 12.0, along: 10.0 }, Beside { z: 10.0, along: -10.0 }]);
+        assert!((told.z(5.0) - 44.0_f64.sqrt()).abs() < 1e-12, "{}", told.z(5.0));
+        assert!((told.smallest(4.0) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn other_updrafts_bend_the_response() {
+        let data = trial::data(4, |_, _| 0.0);
+        let comparison = trial::comparison(&data);
+        let there = elsewhere(&comparison, &comparison.vehicle).unwrap();
+        assert_eq!(there.len(), BESIDE_MPS.len());
+        let rose = |by_mps: f64| {
+            let place = BESIDE_MPS.iter().position(|one| *one == by_mps).unwrap();
+            there[place].at(0, 0, 0)
+        };
+        assert!(rose(0.4) < 0.0 && rose(-0.4) > 0.0, "less thrust holds a drone in rising air");
+        assert!(rose(2.0) < 3.0 * rose(0.4));
+    }
+}

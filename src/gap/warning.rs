@@ -15,6 +15,9 @@ use crate::numeric::upper_median;
 
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
+/// Wind that is read from leans alone is doubted aloud from this speed, m/s. Chosen: rotors' drag that was hidden in 1.5 m/s made 8 of
+/// it, and less than this leans a drone by no more than its own attitude error.
+const WINDY_MPS: f64 = 3.0;
 /// Shares of the square in a thrust curve that differ by less are the same. Chosen: motors of one kind differ by as much.
 const SAME_EXPO: f64 = 0.05;
 
@@ -82,6 +85,11 @@ pub enum Warning {
     Tables,
     /// All drones climb at the same time.
     OneGroup,
+    /// The wind is known from nothing but how the drones leaned.
+    WindByLean {
+        /// Speed of the mean wind, m/s.
+        wind_mps: f64,
+    },
     /// None of the drones of a group gave a usable log.
     GroupLost {
         /// Name of the group in the plan.
@@ -192,6 +200,12 @@ impl fmt::Display for Warning {
                 "all drones climb at the same time: what depends on climb speed is mixed with the \
                  shared air (calibration-counterphase tells them apart)",
             ),
+            Self::WindByLean { wind_mps } => write!(
+                f,
+                "no horizontal leg tells the wind: {wind_mps:.1} m/s are read from how the drones lean, by the model's \
+                 own drag, and drag of the body or the rotors that the model lacks would look like that \
+                 (calibration-counterphase has legs)"
+            ),
             Self::GroupLost { group, planned, left } => {
                 write!(
                     f,
@@ -279,6 +293,12 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
             warnings.push(Warning::OneGroup);
         }
         warnings.extend(lost);
+        let wind = &found.comparison.wind;
+        let wind_mps = wind.mean_mps[0].hypot(wind.mean_mps[1]);
+        let is_by_lean = wind.measured.is_none() && wind.mean_se_mps > 0.0;
+        if is_by_lean && input.simulated.is_none() && wind_mps >= WINDY_MPS {
+            warnings.push(Warning::WindByLean { wind_mps });
+        }
     }
     if found.comparison.scene.volts.is_none() {
         warnings.push(Warning::NoRestingVoltage);

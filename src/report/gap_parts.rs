@@ -252,7 +252,10 @@ pub(super) fn detectables(verdict: &Verdict) -> Value {
             effect => clean(&one.effect),
             title,
             parameter => clean(&one.parameter),
-            smallest => one.smallest.map_or_else(|| NONE.to_owned(), |s| with_unit(s, &one.unit)),
+            smallest => one.smallest.map_or_else(
+                || NONE.to_owned(),
+                |smallest| with_unit(smallest.copysign(one.usual), &one.unit),
+            ),
             usual => with_unit(one.usual, &one.unit),
             z => fixed(one.usual_z.abs(), 1),
             like => if one.like.is_empty() { NONE.to_owned() } else { clean(&one.like.join(", ")) },

@@ -246,7 +246,10 @@ fn hidden_row(one: &Detectable) -> Vec<String> {
     };
     vec![
         clean(&one.effect),
-        one.smallest.map_or_else(|| "none".to_owned(), |s| format!("{}{unit}", short(s))),
+        one.smallest.map_or_else(
+            || "none".to_owned(),
+            |smallest| format!("{}{unit}", short(smallest.copysign(one.usual))),
+        ),
         short(one.usual),
         format!("{:.1}", one.usual_z.abs()),
         why,

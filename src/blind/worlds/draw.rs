@@ -9,10 +9,10 @@ use foreign_worlds::plant::{BladeElement, Motor, Plant, Rotor};
 use rand_pcg::Pcg64;
 
 use super::known;
-use super::{ForeignKind, kind_of};
+use super::kind_of;
 use crate::base::rng::{Purpose, stream};
 use crate::blind::error::BlindError;
-use crate::blind::hide::{Hidden, between, log_between, unit};
+use crate::blind::hide::{Hidden, between, counted_by_s, log_between, unit};
 use crate::blind::scenario::{Base, Cell};
 use crate::effects::Role;
 use crate::gap::Dependence;
@@ -213,7 +213,7 @@ fn truth(world: &World, known: &Vehicle, effect: &HiddenEffect) -> Option<Hidden
     if let (Some(slope_us), Some(time_s), Some(known_s)) = (
         parameters.get("slope_us").copied(),
         parameters.get("time_s").copied(),
-        own_time_s(kind, known),
+        kind.like.and_then(|effect| counted_by_s(effect, known)),
     ) {
         parameters.insert("slope_us".to_owned(), slope_us * known_s / time_s);
         parameters.insert("time_s".to_owned(), known_s);
@@ -228,12 +228,6 @@ fn truth(world: &World, known: &Vehicle, effect: &HiddenEffect) -> Option<Hidden
         words: format!("{magnitude:.3} {}", first.name),
         depends_on: own.depends_on.iter().filter_map(|name| Dependence::of(name)).collect(),
     })
-}
-
-/// Time that the library's effect of a kind counts its change by, where it has one, s.
-fn own_time_s(kind: &ForeignKind, known: &Vehicle) -> Option<f64> {
-    let effect = crate::effects::find(kind.like?)?;
-    effect.definition().parameter("time_s").map(|parameter| (parameter.default)(known))
 }
 
 /// Drag coefficient times area from above, m².

@@ -64,7 +64,7 @@ fn text(verified: &Verification) -> String {
     text.push_str(match (verified.intact, verified.revealed) {
         (true, true) => "All of it belongs together: the truth is the one that was published, and the seal was opened for this verdict.\n",
         (true, false) => "All of it belongs together. The seal was not opened yet.\n",
-        (false, _) => "Something was altered: this game proves nothing.\n",
+        (false, _) => "Something was altered or is missing: as it is, this game proves nothing.\n",
     });
     text
 }

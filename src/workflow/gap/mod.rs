@@ -167,12 +167,14 @@ fn output(request: &Request) -> Result<PathBuf, WorkflowError> {
             folder.shown()
         )));
     }
+    let has_verdict = folder.join(VERDICT).exists();
     if let Some(game) = &request.campaign
         && record::path(game).exists()
-        && folder.join(VERDICT).exists()
+        && (has_verdict || request.output.is_none())
     {
+        let is = if has_verdict { "is" } else { "was" };
         return Err(WorkflowError::Usage(format!(
-            "{} is the verdict of a game whose seal was opened, and who knows the truth cannot be asked again; \
+            "{} {is} the verdict of a game whose seal was opened, and who knows the truth cannot be asked again; \
              to compare all the same, choose another folder with -o",
             folder.join(VERDICT).shown()
         )));

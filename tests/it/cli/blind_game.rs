@@ -245,6 +245,11 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     );
     assert_eq!(fs::read(bench.path("game/gap/verdict.json")).unwrap(), verdict_of_this);
     fs::rename(bench.path("game/gap/verdict.json"), bench.path("kept")).unwrap();
+    let ended = bench.expect(2, &["gap", "game"]);
+    assert!(
+        ended.err.contains("game/gap/verdict.json was the verdict of a game whose seal was opened"),
+        "{ended}"
+    );
     let ended = bench.expect(5, &["blind", "reveal", "game"]);
     assert!(ended.err.contains("the seal was opened before (game/reveal.json)"), "{ended}");
     compare(&bench, "game/gap", &naming("rotor-inflow", "inflow_share", 0.3));

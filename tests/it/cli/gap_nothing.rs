@@ -38,6 +38,14 @@ impl Flight {
         if verdict["sensor"]["named"] != false {
             let _ = write!(found, " {}", verdict["sensor"]);
         }
+        // Only a ladder with horizontal legs knows the wind by more than its model.
+        let is_by_lean =
+            verdict["cautions"].to_string().contains("no horizontal leg tells the wind");
+        if is_by_lean && *template == TEMPLATES[1]
+            || !is_by_lean && *template == TEMPLATES[0] && *wind_mps == 8
+        {
+            found.push_str(" wind by lean");
+        }
         found
     }
 

@@ -27,6 +27,7 @@ mod flights;
 mod foreign_text;
 mod gap;
 mod gap_firmware;
+mod gap_in_updraft;
 mod gap_next;
 mod gap_nothing;
 pub(crate) mod guided;
