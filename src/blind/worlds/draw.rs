@@ -8,8 +8,8 @@ use foreign_worlds::noise::NoiseSettings;
 use foreign_worlds::plant::{BladeElement, Motor, Plant, Rotor};
 use rand_pcg::Pcg64;
 
-use super::known;
 use super::kind_of;
+use super::known;
 use crate::base::rng::{Purpose, stream};
 use crate::blind::error::BlindError;
 use crate::blind::hide::{Hidden, between, counted_by_s, log_between, unit};
