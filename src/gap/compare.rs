@@ -372,6 +372,7 @@ impl Comparison {
         let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
+        let beside_hover_us = self.beside_hover_us(vehicle)?;
         let differing = self.differing(vehicle)?;
         Ok(self
             .data
@@ -379,20 +380,9 @@ impl Comparison {
             .iter()
             .enumerate()
             .map(|(group, of)| {
-                let pulse = |bin: usize| {
-                    let drones = 0..of.slots.len().max(1);
-                    mean(drones.map(|drone| closed.at(group, drone, bin))).unwrap_or_default()
-                };
-                let pulses: Vec<f64> = (0..of.bins.len()).map(pulse).collect();
-                let in_hover = |values: &[f64]| {
-                    let bins = of.bins.iter().zip(values);
-                    let hovers =
-                        bins.filter(|(bin, _)| bin.kind.is_hover()).map(|(_, value)| value);
-                    mean(hovers).or_else(|| mean(values)).unwrap_or_default()
-                };
-                let hover_us = in_hover(&pulses);
+                let in_hover = |values: &[f64]| of.in_hover(values);
                 let after_s = FLIGHTS_APART_S * of.flight as f64;
-                let slope_us: Vec<f64> = pulses.iter().map(|pulse| pulse - hover_us).collect();
+                let slope_us = beside_hover_us[group].clone();
                 let (offset, slope_us) = drones_differ(&differing, group, in_hover, slope_us);
                 GroupPattern {
                     drones: of.slots.len(),
@@ -411,6 +401,24 @@ impl Comparison {
                 }
             })
             .collect())
+    }
+
+    /// Pulse of a vehicle beside that in hover, by group and bin, us: what a relative error of the whole response does.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn beside_hover_us(&self, vehicle: &Vehicle) -> Result<Vec<Vec<f64>>, EffectError> {
+        let closed = self.scene_of(vehicle).pulses(vehicle)?;
+        let beside = |(group, of): (usize, &Group)| {
+            let pulse = |bin: usize| {
+                let drones = 0..of.slots.len().max(1);
+                mean(drones.map(|drone| closed.at(group, drone, bin))).unwrap_or_default()
+            };
+            let pulses: Vec<f64> = (0..of.bins.len()).map(pulse).collect();
+            let hover_us = of.in_hover(&pulses);
+            pulses.iter().map(|pulse| pulse - hover_us).collect()
+        };
+        Ok(self.data.groups.iter().enumerate().map(beside).collect())
     }
 
     /// Only some bins, chosen by the places of group and bin.

@@ -76,6 +76,13 @@ pub struct Group {
 }
 
 impl Group {
+    /// Mean of something over the group's hovers, or over all bins if it has none.
+    pub(super) fn in_hover(&self, values: &[f64]) -> f64 {
+        let bins = self.bins.iter().zip(values);
+        let hovers = bins.filter(|(bin, _)| bin.kind.is_hover()).map(|(_, value)| value);
+        mean(hovers).or_else(|| mean(values)).unwrap_or_default()
+    }
+
     /// Mean over the drones of something in a bin.
     pub fn mean(&self, bin: usize, of: impl Fn(&BinValues) -> f64) -> f64 {
         mean(self.measured.iter().map(|drone| of(&drone[bin]))).unwrap_or_default()

@@ -33,7 +33,12 @@ pub(super) fn drones(
     original: &Vehicle,
     is_held: impl Fn(u16) -> bool,
 ) -> Result<(Drones, Option<Step>), GapError> {
-    let patterns = all.patterns(&found.vehicle, found.gusts_mps)?;
+    let mut patterns = all.patterns(&found.vehicle, found.gusts_mps)?;
+    // Kinds of spread are told apart by how responses follow offsets, so neither may have the other in it.
+    for (pattern, slope_us) in patterns.iter_mut().zip(all.beside_hover_us(&found.vehicle)?) {
+        pattern.offset.clear();
+        pattern.slope_us = slope_us;
+    }
     let residual = Split::of(&all.residual(&found.vehicle, found.gusts_mps)?);
     let mut each = Vec::new();
     let mut plain_us = Vec::new();
