@@ -16,7 +16,7 @@ use crate::numeric::upper_median;
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
 /// Wind that is read from leans alone is doubted aloud from this speed, m/s. Chosen: rotors' drag that was hidden in 1.5 m/s made 8 of
-/// it, and less than this leans a drone by no more than its own attitude error.
+/// it.
 const WINDY_MPS: f64 = 3.0;
 /// Shares of the square in a thrust curve that differ by less are the same. Chosen: motors of one kind differ by as much.
 const SAME_EXPO: f64 = 0.05;
