@@ -16,9 +16,10 @@ use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
 use super::scene::Scene;
+use super::spreads::{Differences, Spread};
 use super::stand_in::{as_flown, own_wind};
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
-use crate::effects::{EffectError, Reference, Role, find, select};
+use crate::effects::{EffectError, Reference, Role};
 use crate::mission::plan::Plan;
 use crate::numeric::{Moments, mean, most};
 use crate::vehicle::Vehicle;
@@ -65,8 +66,8 @@ pub struct Comparison {
     amsl_m: f64,
     /// Mean drone of the fleet, by the model.
     pub vehicle: Vehicle,
-    /// What makes drones differ by the model: effect, parameter, and its size.
-    spreads: Vec<(String, String, f64)>,
+    /// What makes drones differ by the model.
+    pub(super) spreads: Vec<Spread>,
     /// Whether another program simulated the other side.
     is_foreign: bool,
     /// Wind that another program simulated, where the measured drones flew in another, m/s.
@@ -137,7 +138,7 @@ impl Comparison {
         updraft_mps: f64,
         near: Option<&Self>,
     ) -> Result<Self, GapError> {
-        let spreads = spreads(vehicle);
+        let spreads = Spread::all_of(vehicle);
         let vehicle = mean_drone(vehicle);
         let amsl_m = amsl_m(plan);
         let law = lean_law(&vehicle, amsl_m, updraft_mps);
@@ -300,13 +301,6 @@ impl Comparison {
         self
     }
 
-    /// This comparison with drones that differ as those of a vehicle do: what was found is in a mean drone, which
-    /// differs from none.
-    #[must_use]
-    pub(super) fn spread_as(self, vehicle: &Vehicle) -> Self {
-        Self { spreads: spreads(vehicle), ..self }
-    }
-
     /// This comparison with an additional response to vertical air speed, by group and bin, that no effect
     /// of the vehicle has.
     #[must_use]
@@ -372,18 +366,15 @@ impl Comparison {
         let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
-        let beside_hover_us = self.beside_hover_us(vehicle)?;
-        let differing = self.differing(vehicle)?;
+        let differences = self.drones_differ(vehicle, self.beside_hover_of(&closed))?;
         Ok(self
             .data
             .groups
             .iter()
             .enumerate()
-            .map(|(group, of)| {
-                let in_hover = |values: &[f64]| of.in_hover(values);
+            .zip(differences)
+            .map(|((group, of), Differences { offset, slope_us })| {
                 let after_s = FLIGHTS_APART_S * of.flight as f64;
-                let slope_us = beside_hover_us[group].clone();
-                let (offset, slope_us) = drones_differ(&differing, group, in_hover, slope_us);
                 GroupPattern {
                     drones: of.slots.len(),
                     time_s: of.bins.iter().map(|bin| after_s + bin.middle_s()).collect(),
@@ -408,7 +399,11 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub(super) fn beside_hover_us(&self, vehicle: &Vehicle) -> Result<Vec<Vec<f64>>, EffectError> {
-        let closed = self.scene_of(vehicle).pulses(vehicle)?;
+        Ok(self.beside_hover_of(&self.scene_of(vehicle).pulses(vehicle)?))
+    }
+
+    /// Pulse beside that in hover, by group and bin, us.
+    fn beside_hover_of(&self, closed: &Column) -> Vec<Vec<f64>> {
         let beside = |(group, of): (usize, &Group)| {
             let pulse = |bin: usize| {
                 let drones = 0..of.slots.len().max(1);
@@ -418,7 +413,7 @@ impl Comparison {
             let hover_us = of.in_hover(&pulses);
             pulses.iter().map(|pulse| pulse - hover_us).collect()
         };
-        Ok(self.data.groups.iter().enumerate().map(beside).collect())
+        self.data.groups.iter().enumerate().map(beside).collect()
     }
 
     /// Only some bins, chosen by the places of group and bin.
@@ -577,68 +572,6 @@ impl Comparison {
         Ok(doubts)
     }
 
-    /// Change of the pulse by one standard deviation of the mean of each group's drones, for each effect that makes
-    /// drones differ by the model, and group: few drones are not the fleet.
-    ///
-    /// # Errors
-    /// Effects of the vehicle that are not valid.
-    pub(super) fn spread_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
-        let mut doubts = Vec::new();
-        for (effect, parameter, size) in &self.spreads {
-            let mut spread = vehicle.clone();
-            select::set(&mut spread, effect, parameter, *size);
-            let by = |effect: &str| self.scene.deviating(&spread, effect);
-            let (without, with) = (by("")?, by(effect)?);
-            for group in 0..with.len() {
-                let zero = Column::Shared(with.clone());
-                let doubt =
-                    zero.each(
-                        |of, _, bin| {
-                            if of == group { with[of][bin] - without[of][bin] } else { 0.0 }
-                        },
-                    );
-                doubts.push(doubt);
-            }
-        }
-        doubts.retain(|doubt| doubt.range() > LEAST_DOUBT_US);
-        Ok(doubts)
-    }
-
-    /// What each way in which the vehicle lets drones differ changes of the pulse, by one standard deviation, by group and bin, us.
-    fn differing(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
-        let of = |(effect, parameter, size): &(String, String, f64)| {
-            let mut spread = vehicle.clone();
-            select::set(&mut spread, effect, parameter, *size);
-            let scene = self.scene_of(vehicle);
-            let (without, mut with) =
-                (scene.deviating(&spread, "")?, scene.deviating(&spread, effect)?);
-            for ((with, without), group) in with.iter_mut().zip(&without).zip(&self.data.groups) {
-                let drones = group.slots.len().max(1) as f64;
-                for (with, without) in with.iter_mut().zip(without) {
-                    *with = (*with - without) * drones.sqrt();
-                }
-            }
-            Ok(with)
-        };
-        self.spreads.iter().map(of).collect()
-    }
-
-    /// Standard deviation of the pulse from drone to drone by what makes them differ in the model, in the air and at
-    /// the climbs of this flight, us.
-    ///
-    /// # Errors
-    /// Effects of the vehicle that are not valid.
-    pub(super) fn offsets_us(&self, vehicle: &Vehicle) -> Result<f64, EffectError> {
-        let doubts = self.spread_doubts(vehicle)?;
-        let variance = |(group, of): (usize, &Group)| -> f64 {
-            let of_mean = |doubt: &Column| {
-                mean((0..of.bins.len()).map(|bin| doubt.at(group, 0, bin))).unwrap_or_default()
-            };
-            of.slots.len() as f64 * doubts.iter().map(|doubt| of_mean(doubt).powi(2)).sum::<f64>()
-        };
-        Ok(mean(self.data.groups.iter().enumerate().map(variance)).unwrap_or_default().sqrt())
-    }
-
     /// Whether the other side is another program's simulation, which may differ in several things at once.
     pub(super) fn is_foreign(&self) -> bool {
         self.is_foreign
@@ -765,66 +698,6 @@ impl Reading {
     }
 }
 
-/// How drones of a group differ: what changes a drone's pulse by 1 us in hover, and what a relative error of its response does, us.
-/// Of what the vehicle lets them differ in, that which changes hovers most, and much the same everywhere, and that which changes others
-/// beside hovers most; otherwise an offset, and `slope_us`.
-fn drones_differ(
-    differing: &[Vec<Vec<f64>>],
-    group: usize,
-    in_hover: impl Fn(&[f64]) -> f64,
-    slope_us: Vec<f64>,
-) -> (Vec<f64>, Vec<f64>) {
-    let rms =
-        |values: &[f64]| mean(values.iter().map(|value| value * value)).unwrap_or_default().sqrt();
-    let ways = differing.iter().filter_map(|way| way.get(group));
-    // What goes with the climb more than it changes hovers is no offset.
-    let is_offset = |way: &&Vec<f64>| {
-        let hover_us = in_hover(way);
-        let beside: Vec<f64> = way.iter().map(|value| value - hover_us).collect();
-        hover_us.abs() > LEAST_DOUBT_US && rms(&beside) < 0.5 * hover_us.abs()
-    };
-    let offsets = ways.clone().filter(is_offset);
-    let most = offsets.max_by(|a, b| in_hover(a).abs().total_cmp(&in_hover(b).abs()));
-    let offset: Vec<f64> = most
-        .map(|way| {
-            let hover_us = in_hover(way);
-            way.iter().map(|value| value / hover_us).collect()
-        })
-        .unwrap_or_default();
-    let beside = ways.filter(|way| most.is_none_or(|most| *way != most)).map(|way| {
-        let hover_us = in_hover(way);
-        let at = |bin: usize| offset.get(bin).copied().unwrap_or(1.0);
-        let each = way.iter().enumerate().map(|(bin, value)| value - hover_us * at(bin));
-        each.collect::<Vec<f64>>()
-    });
-    let beside = beside.max_by(|a, b| rms(a).total_cmp(&rms(b)));
-    let slope_us = match beside.filter(|beside| rms(beside) > LEAST_DOUBT_US) {
-        Some(beside) => {
-            // As large as a relative error of the whole response.
-            let times = rms(&slope_us) / rms(&beside);
-            beside.iter().map(|value| value * times).collect()
-        }
-        None => slope_us,
-    };
-    (offset, slope_us)
-}
-
-/// What makes a vehicle's drones differ: effect, parameter, and its size.
-fn spreads(vehicle: &Vehicle) -> Vec<(String, String, f64)> {
-    let mut found = Vec::new();
-    for (name, table) in vehicle.effects.iter().filter(|(_, table)| table.on) {
-        let parameters = find(name).into_iter().flat_map(|effect| effect.definition().parameters);
-        for spread in parameters.filter(|one| one.role.is_some_and(Role::is_spread)) {
-            let size = table.parameters.get(spread.name).copied();
-            let size = size.unwrap_or_else(|| (spread.default)(vehicle));
-            if size > 0.0 {
-                found.push((name.clone(), spread.name.to_owned(), size));
-            }
-        }
-    }
-    found
-}
-
 /// The bins that are there.
 pub(super) fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
     values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
@@ -834,7 +707,7 @@ pub(super) fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
 /// an attitude, and 0.4 m/s on a drone that leans by 1.2 degrees per m/s.
 const OTHER_WIND_DEG: f64 = 0.5;
 /// Nuisance regressors with a smaller effect are left out, us. Far below the noise; saves time only.
-const LEAST_DOUBT_US: f64 = 1e-3;
+pub(super) const LEAST_DOUBT_US: f64 = 1e-3;
 /// Standard deviation of how much of the wind leans misread in climb or descent, as a share. Two models of the same
 /// rotor, fitted to each other over the flown speeds, differ by 3 % (rms) and up to 8 % in how they lean there.
 const LEAN_FORM_SHARE: f64 = 0.05;
@@ -939,30 +812,6 @@ fn rectified(
 mod tests {
     use super::super::trial;
     use super::*;
-
-    #[test]
-    fn drones_differ_as_the_vehicle_lets_them() {
-        let in_hover = |values: &[f64]| values[0];
-        let differ = |ways: &[[f64; 3]]| {
-            let ways: Vec<Vec<Vec<f64>>> = ways.iter().map(|way| vec![way.to_vec()]).collect();
-            drones_differ(&ways, 0, in_hover, vec![0.0, 30.0, -40.0])
-        };
-        assert_eq!(differ(&[]), (vec![], vec![0.0, 30.0, -40.0]));
-        // Thrust changes hovers most; of inflow, what is no offset counts, as large as that of the whole response.
-        let (thrust, inflow) = ([4.0, 4.4, 3.8], [1.0, 4.1, -3.05]);
-        for ways in [[thrust, inflow], [inflow, thrust]] {
-            let (offset, slope_us) = differ(&ways);
-            assert_eq!(offset, [1.0, 1.1, 0.95]);
-            assert!((slope_us[1] - 30.0).abs() < 1e-9 && (slope_us[2] + 40.0).abs() < 1e-9);
-            assert_eq!(slope_us[0], 0.0);
-        }
-        // In an updraft inflow changes hovers as well.
-        let (offset, slope_us) = differ(&[[5.0, 8.0, 1.0], thrust]);
-        assert!(offset == [1.0, 1.1, 0.95] && slope_us[1] > 0.0, "{offset:?} {slope_us:?}");
-        assert_eq!(differ(&[[5.0, 12.0, -4.0]]).0, [0.0; 0], "and is no offset alone");
-        let (offset, slope_us) = differ(&[thrust]);
-        assert_eq!((offset.len(), slope_us), (3, vec![0.0, 30.0, -40.0]), "one way is the offset");
-    }
 
     #[test]
     fn who_leans_otherwise_leant_in_another_wind() {

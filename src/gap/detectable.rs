@@ -48,6 +48,7 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let candidates = library(&found.vehicle, comparison, Updraft::Same)?;
     let drones = comparison.data.counts();
     let elsewhere = elsewhere(comparison, &found.vehicle)?;
+    let elsewhere: Vec<White> = elsewhere.iter().map(|column| solution.white(column)).collect();
     let best: Vec<(&Candidate, Option<Trace>)> = candidates
         .iter()
         .map(|candidate| {
@@ -138,21 +139,25 @@ struct Beside {
     along: f64,
 }
 
+impl Beside {
+    /// Square of the z of what it has not in common with the effect.
+    fn across2(&self) -> f64 {
+        (self.z * self.z - self.along * self.along).max(0.0)
+    }
+}
+
 impl Trace {
     /// Fisher z of a size: what tells it from a flight without the effect in whichever updraft is most like it.
     fn z(&self, size: f64) -> f64 {
         let here = self.per_size * size;
-        let apart2 = |one: &Beside| {
-            let across2 = (one.z * one.z - one.along * one.along).max(0.0);
-            across2 + (here - one.along).powi(2)
-        };
+        let apart2 = |one: &Beside| one.across2() + (here - one.along).powi(2);
         self.beside.iter().map(apart2).fold(here * here, f64::min).max(0.0).sqrt()
     }
 
     /// The size from which this z is reached whichever updraft the flight was in.
     fn smallest(&self, z: f64) -> f64 {
         let needed = |one: &Beside| {
-            let across2 = (one.z * one.z - one.along * one.along).max(0.0);
+            let across2 = one.across2();
             (across2 < z * z).then(|| one.along + (z * z - across2).sqrt())
         };
         self.beside.iter().filter_map(needed).fold(z, f64::max) / self.per_size
@@ -184,7 +189,7 @@ fn strongest(
     candidate: &Candidate,
     form: Option<f64>,
     solution: &Solution,
-    (drones, elsewhere): (&[usize], &[Column]),
+    (drones, elsewhere): (&[usize], &[White]),
 ) -> Option<Trace> {
     let now = candidate.size.map_or(0.0, |size| size.now);
     let is_usual = |variant: &&Variant| form.is_none() || variant.form == form;
@@ -200,10 +205,9 @@ fn strongest(
             (white, per_size, variant, by)
         })
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let beside = elsewhere.iter().map(|column| {
-        let other = solution.white(column);
-        let z = solution.information(&other).max(0.0).sqrt();
-        Beside { z, along: z * solution.likeness(&white, &other) }
+    let beside = elsewhere.iter().map(|other| {
+        let z = solution.information(other).max(0.0).sqrt();
+        Beside { z, along: z * solution.likeness(&white, other) }
     });
     let beside = beside.collect();
     let us = variant.column.spread(drones) / by;

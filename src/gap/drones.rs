@@ -272,3 +272,69 @@ fn words(each: &[DroneOffset], correlation: Option<f64>, found: &Found) -> Vec<S
     }
     words
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::compare::Simulated;
+    use super::super::trial;
+    use super::*;
+    use crate::vehicle::library::builtin;
+
+    /// Spreads of a known fleet, of what is hidden in it, and of inflow: relative.
+    const KNOWN: f64 = 0.016;
+    const HIDDEN: f64 = 0.05;
+    const INFLOW: f64 = 0.06;
+    const DRONES: usize = 49;
+
+    /// Standard normal values in some order.
+    fn scatter(drone: usize, times: usize) -> f64 {
+        use statrs::distribution::Normal;
+        let share = ((times * drone) % DRONES) as f64 + 0.5;
+        Normal::standard().inverse_cdf(share / DRONES as f64)
+    }
+
+    /// What is said of show drones that differ by so much in something, and in their inflow.
+    fn told(differ: fn(&mut Vehicle, f64)) -> Option<Step> {
+        let mut known = builtin("pixel").unwrap();
+        Role::ThrustSpread.set(&mut known, KNOWN);
+        Role::InflowSpread.set(&mut known, INFLOW);
+        let pulse_us = |vehicle: &Vehicle, climb_mps: f64| {
+            let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+            Model::of(vehicle).unwrap().pulse_us(&Signals { climb_mps, ..here })
+        };
+        let flown: Vec<Vehicle> = (0..DRONES)
+            .map(|drone| {
+                let mut one = known.clone();
+                differ(&mut one, 1.0 + HIDDEN * scatter(drone, 1));
+                let share = Role::InflowShare.value(&one).unwrap();
+                Role::InflowShare.set(&mut one, share * (1.0 + INFLOW * scatter(drone, 17)));
+                one
+            })
+            .collect();
+        let data = trial::data(DRONES, |drone, bin| {
+            let ripple_us = 0.3 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+            let own_us = pulse_us(&flown[drone], bin.climb_mps());
+            own_us - pulse_us(&trial::vehicle(), bin.climb_mps()) + ripple_us
+        });
+        let all = Comparison::new(&data, &known, &Simulated::Closed, None).unwrap();
+        let mut found = Found::nothing(all.clone());
+        found.refit(&all).unwrap();
+        drones(&all, &found, &known, |_| false).unwrap().1
+    }
+
+    fn names(step: &Step) -> Vec<&str> {
+        match &step.finding {
+            Finding::Name { effect, .. } => vec![effect],
+            Finding::Class { effects, .. } => effects.iter().map(String::as_str).collect(),
+            Finding::Unknown { .. } => Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_spread_of_thrust_is_not_one_of_mass() {
+        let thrust = told(|vehicle, times| vehicle.airframe.thrust_coefficient /= times).unwrap();
+        let mass = told(|vehicle, times| vehicle.airframe.mass_kg *= times).unwrap();
+        assert_eq!(names(&thrust), ["thrust-spread"]);
+        assert!(names(&mass).contains(&"mass-spread"), "{:?}", mass.finding);
+    }
+}

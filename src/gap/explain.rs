@@ -343,9 +343,12 @@ impl Search<'_> {
             Some(only) => self.look_where_it_explains_most(only)?,
             None => Some(self.look_in_likelier_updraft()?),
         };
-        let Some(look) = look else { return Ok(Taken::No(None)) };
-        if asked.is_some_and(|only| only.is_out_of_reach(look.explained().nats)) {
-            return Ok(Taken::No(None));
+        let Some(mut look) = look else { return Ok(Taken::No(None)) };
+        if let Some(only) = asked.filter(|only| only.is_out_of_reach(look.explained().nats)) {
+            look = self.at_fitted_size(look)?;
+            if only.is_out_of_reach(look.explained().nats) {
+                return Ok(Taken::No(None));
+            }
         }
         let look = if asked.is_some() || !self.may_differ_in_updraft() {
             look

@@ -51,6 +51,7 @@ mod search;
 mod sensor;
 mod single;
 mod slopes;
+mod spreads;
 mod stand_in;
 mod steady;
 mod table;

@@ -1,11 +1,11 @@
-//! A curve of the thrust beside the updraft of the whole flight: both bend the response.
+//! An effect that bends the response beside the updraft of the whole flight, which bends it, too: a curve of the thrust, or inflow.
 //!
-//! Without a curve, another updraft can stand for it, and from there no line leads to both: the noise without the curve is larger, and a
-//! curve of another size no multiple of one. So size and updraft are fitted together, by the closed forms, from afar.
+//! Without the effect, another updraft can stand for it, and from there no line leads to both: the noise without it is larger, and
+//! another size no multiple of one. So size and updraft are fitted together, by the closed forms, from afar.
 
 use rayon::prelude::*;
 
-use super::super::candidates::{Updraft, form_of, one};
+use super::super::candidates::{Candidate, Updraft, Variant, form_of, one};
 use super::super::compare::Comparison;
 use super::super::error::GapError;
 use super::super::gls::Start;
@@ -20,38 +20,49 @@ use crate::vehicle::Vehicle;
 
 /// A step of the updraft that needs no further round, m/s. Numerical.
 const SETTLED_MPS: f64 = 0.02;
-/// Updrafts in which the curve explains less by this much than in the best of them are not begun from, nats. Chosen: in five
+/// Updrafts in which the effect explains less by this much than in the best of them are not begun from, nats. Chosen: in five
 /// flights of 9 and 25 drones in calm air, with a curve in an updraft of -2 m/s, the best led to it.
 const OTHER_START_NATS: f64 = 100.0;
-/// How often the model with the curve is flown where closed forms lead to. Numerical: they are off by some tenths of a metre per second
+/// What is fitted together with the updraft, where the model has none.
+const BENDING: [Role; 2] = [Role::ThrustExpo, Role::InflowShare];
+/// How often the model with the effect is flown where closed forms lead to. Numerical: they are off by some tenths of a metre per second
 /// from afar.
 const FLIGHTS: usize = 3;
 
-/// A curve fitted where its search begins.
+/// An effect in one of its forms, fitted where its search begins.
 struct Begun {
     found: Found,
     flown: Comparison,
+    form: Form,
     /// How likely the flight is, nats but for a constant.
     likely: f64,
 }
 
-/// A curve fitted together with the updraft.
+/// Which form of an effect it is, and what that costs.
+#[derive(Clone, Copy, Debug)]
+struct Form {
+    value: Option<f64>,
+    price_nats: f64,
+}
+
+/// An effect fitted together with the updraft.
 #[derive(Clone, Debug)]
 pub(super) struct Bent {
     effect: &'static str,
     vehicle: Vehicle,
     size: f64,
+    form: Form,
     updraft_mps: f64,
     noise: Start,
     gusts_mps: f64,
-    /// What the model with the curve, flown, leaves, us.
+    /// What the model with the effect, flown, leaves, us.
     raw_us: f64,
     /// How well the flight is explained, nats above the threshold.
     pub nats: f64,
 }
 
 impl Bent {
-    /// Gives findings the curve as it was fitted together with the updraft, where it was taken up.
+    /// Gives findings the effect as it was fitted together with the updraft, where it was taken up.
     pub(super) fn taken_by(self, found: &mut Found, effect: &str) {
         if effect == self.effect {
             found.vehicle = self.vehicle;
@@ -62,14 +73,14 @@ impl Bent {
 }
 
 impl Search<'_> {
-    /// The curve and the updraft that explain the flight best, from some updrafts; `None`: the effect is no curve of the thrust, the
-    /// model has one, it can fly in none of them, or without a curve it is as near to the logs in one of them or in another, m/s.
+    /// The size and the updraft that explain the flight best, from some updrafts; `None`: the effect does not bend the response, the
+    /// model has it, it can fly in none of them, or without it is as near to the logs in one of them or in another, m/s.
     pub(super) fn bends_most(&self, effect: &'static str, other_mps: f64) -> Option<Bent> {
-        if !Role::ThrustExpo.is_of(effect) || Role::ThrustExpo.is_on(&self.found.vehicle) {
+        if !BENDING.iter().any(|role| role.is_of(effect) && !role.is_on(&self.found.vehicle)) {
             return None;
         }
         let begun: Vec<Begun> =
-            UPDRAFTS_MPS.par_iter().filter_map(|start| self.begins_bent(effect, *start)).collect();
+            UPDRAFTS_MPS.par_iter().flat_map(|start| self.begins_bent(effect, *start)).collect();
         let most = begun.iter().map(|one| one.likely).fold(f64::NEG_INFINITY, f64::max);
         let near = begun.into_par_iter().filter(|one| one.likely > most - OTHER_START_NATS);
         let found: Vec<Bent> = near.filter_map(|one| self.bent_from(effect, one)).collect();
@@ -77,23 +88,30 @@ impl Search<'_> {
             found.into_iter().reduce(|best, one| if one.nats > best.nats { one } else { best })?;
         let without_us = |mps: &f64| self.flown_in(*mps).ok()?.raw_gap_us().ok();
         let updrafts_mps = [&[0.0, other_mps], &UPDRAFTS_MPS[..]].concat();
-        let nearest_us = updrafts_mps.iter().filter_map(without_us).fold(f64::INFINITY, f64::min);
+        let each_us: Vec<f64> = updrafts_mps.par_iter().filter_map(without_us).collect();
+        let nearest_us = each_us.into_iter().fold(f64::INFINITY, f64::min);
         (best.raw_us * NEAR < nearest_us).then_some(best)
     }
 
-    /// The curve fitted in one of the updrafts that are begun from; `None`: the vehicle cannot fly so.
-    fn begins_bent(&self, effect: &'static str, start_mps: f64) -> Option<Begun> {
-        let flown = self.flown_in(start_mps).ok()?;
+    /// Each form of the effect fitted in one of the updrafts that are begun from; empty: the vehicle cannot fly so.
+    fn begins_bent(&self, effect: &'static str, start_mps: f64) -> Vec<Begun> {
+        let Ok(flown) = self.flown_in(start_mps) else { return Vec::new() };
         if flown.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
-            return None;
+            return Vec::new();
         }
-        let candidate = one(&self.found.vehicle, &flown, Updraft::Same, effect).ok()??;
-        let size = candidate.size?;
-        let nearest = candidate
-            .variants
-            .iter()
-            .min_by(|a, b| (a.size - size.usual).abs().total_cmp(&(b.size - size.usual).abs()));
-        let vehicle = nearest?.vehicle.clone()?;
+        let candidate = one(&self.found.vehicle, &flown, Updraft::Same, effect);
+        let Ok(Some(Candidate { size: Some(size), variants, .. })) = candidate else {
+            return Vec::new();
+        };
+        let mut nearest: Vec<&Variant> = Vec::new();
+        let off = |one: &Variant| (one.size - size.usual).abs();
+        for variant in &variants {
+            match nearest.iter_mut().find(|other| other.form == variant.form) {
+                Some(other) if off(variant) < off(other) => *other = variant,
+                Some(_) => (),
+                None => nearest.push(variant),
+            }
+        }
         let parameter = Parameter {
             effect,
             name: size.name,
@@ -101,18 +119,24 @@ impl Search<'_> {
             bounds: (size.low, size.high),
             before: None,
         };
-        let mut found = Found { vehicle, parameters: vec![parameter], ..self.found.clone() };
-        found.noise = Start::default();
-        let likely = fits(&mut found, &flown)?.likely;
-        Some(Begun { found, flown, likely })
+        let begun = |variant: &Variant| {
+            let vehicle = variant.vehicle.clone()?;
+            let mut found =
+                Found { vehicle, parameters: vec![parameter.clone()], ..self.found.clone() };
+            found.noise = Start::default();
+            let form = Form { value: variant.form, price_nats: variant.price_nats };
+            let likely = fits(&mut found, &flown)?.likely - form.price_nats;
+            Some(Begun { found, flown: flown.clone(), form, likely })
+        };
+        nearest.into_iter().filter_map(begun).collect()
     }
 
     fn bent_from(&self, effect: &'static str, begun: Begun) -> Option<Bent> {
-        let Begun { mut found, mut flown, .. } = begun;
+        let Begun { mut found, mut flown, form, .. } = begun;
         for flight in 0..FLIGHTS {
             let updraft_mps = settles(&mut found, &flown)?;
             if flight == 0 {
-                let nats = explains(&found, &flown.in_updraft(updraft_mps))?;
+                let nats = explains(&found, &flown.in_updraft(updraft_mps))? - form.price_nats;
                 if self.options.only.is_some_and(|only| only.is_out_of_reach(nats)) {
                     return None;
                 }
@@ -123,9 +147,10 @@ impl Search<'_> {
         Some(Bent {
             effect,
             size,
+            form,
             updraft_mps: flown.scene.updraft_mps,
             raw_us: flown.raw_gap_us().ok()?,
-            nats: explains(&found, &flown)?,
+            nats: explains(&found, &flown)? - form.price_nats,
             vehicle: found.vehicle,
             noise: found.noise,
             gusts_mps: found.gusts_mps,
@@ -141,7 +166,7 @@ impl Search<'_> {
         is_alike.then(|| there.spread_as(self.vehicle))
     }
 
-    /// What is left in the updraft of a curve, with that curve among what may explain it; `None`: the model without it cannot
+    /// What is left in the updraft of an effect, with that effect among what may explain it; `None`: the model without it cannot
     /// fly the same flight there.
     pub(super) fn look_where_it_bends(&mut self, bent: Bent) -> Result<Option<Look>, GapError> {
         let bins = self.comparison.data.bins_of_groups();
@@ -154,7 +179,9 @@ impl Search<'_> {
         let mut look = self.look_at_beginning()?;
         let form = form_of(&bent.vehicle, bent.size, (&self.found.vehicle, &self.comparison))?;
         for candidate in look.candidates.iter_mut().filter(|one| one.name == bent.effect) {
-            candidate.variants.extend(form.clone());
+            let Form { value, price_nats } = bent.form;
+            let of_form = |one: Variant| Variant { form: value, price_nats, ..one };
+            candidate.variants.extend(form.clone().map(of_form));
         }
         look.by_form_nats = Some(bent.nats);
         self.bent = Some(bent);
@@ -169,7 +196,7 @@ fn explains(found: &Found, flown: &Comparison) -> Option<f64> {
     Some(likely_if(flown, &found.vehicle, &doubts, noise)? - FLOOR_NATS)
 }
 
-/// Fits a curve's size in the updraft of a comparison, by closed forms.
+/// Fits an effect's size in the updraft of a comparison, by closed forms.
 fn fits(found: &mut Found, there: &Comparison) -> Option<InUpdraft> {
     found.refit(there).ok()?;
     let patterns = there.patterns(&found.vehicle, found.gusts_mps).ok()?;
@@ -178,7 +205,7 @@ fn fits(found: &mut Found, there: &Comparison) -> Option<InUpdraft> {
     InUpdraft::fitted(there, &patterns, found, &free, &found.noise, updraft_mps)
 }
 
-/// Fits a curve's size and the updraft beside a flight, by closed forms: that updraft, m/s; `None`: the vehicle cannot fly so.
+/// Fits an effect's size and the updraft beside a flight, by closed forms: that updraft, m/s; `None`: the vehicle cannot fly so.
 fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
     let mut updraft_mps = flown.scene.updraft_mps;
     for _ in 0..UPDRAFT_ROUNDS {
@@ -202,17 +229,12 @@ mod tests {
     use super::*;
     use crate::effects::{Model, Signals};
 
-    /// The vehicle with a curve of the thrust.
-    fn bent(expo: f64) -> Vehicle {
-        let mut vehicle = trial::vehicle();
-        Role::ThrustExpo.set(&mut vehicle, expo);
-        vehicle
-    }
-
-    #[test]
-    fn a_curve_is_found_together_with_its_updraft() {
+    /// What is found of an effect in a flight in an updraft of -1.6 m/s with it, and whether the look there explains as much.
+    fn found_together(role: Role, size: f64) -> (f64, f64, bool) {
         let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
-        let [plain, with] = [&vehicle, &bent(0.4)].map(|one| Model::of(one).unwrap());
+        let mut with = vehicle.clone();
+        role.set(&mut with, size);
+        let [plain, with] = [&vehicle, &with].map(|one| Model::of(one).unwrap());
         let pulse_us = |model: &Model, climb_mps: f64| {
             let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
             model.pulse_us(&Signals { climb_mps, ..here })
@@ -226,19 +248,33 @@ mod tests {
         let (options, flights) = (Options::default(), ModelFlights::default());
         let given = (&simulated, &options, &flights);
         let mut search = begun(&data, &vehicle, given, comparison);
-        let curve = Role::ThrustExpo.place().unwrap().name();
-        let found = search.bends_most(curve, 0.0).unwrap();
-        let off = (found.size - 0.4, found.updraft_mps + 1.6);
-        assert!(off.0.abs() < 0.05 && off.1.abs() < 0.15, "{} {}", found.size, found.updraft_mps);
-        let nats = found.nats;
+        assert!(search.bends_most("battery", 0.0).is_none(), "it does not bend the response");
+        let found = search.bends_most(role.place().unwrap().name(), 0.0).unwrap();
+        let (size, updraft_mps, nats) = (found.size, found.updraft_mps, found.nats);
         let look = search.look_where_it_bends(found).unwrap().unwrap();
-        assert!(look.explained().nats >= nats);
-        assert!(search.bends_most("battery", 0.0).is_none(), "no curve");
-        // A model that has a curve is held against its own.
-        let known = bent(0.4);
-        let comparison = Comparison::new(&data, &known, &simulated, None).unwrap();
-        let flights = ModelFlights::default();
-        let search = begun(&data, &known, (&simulated, &options, &flights), comparison);
-        assert!(search.bends_most(curve, 0.0).is_none());
+        (size, updraft_mps, look.explained().nats >= nats)
+    }
+
+    #[test]
+    fn what_bends_the_response_is_found_together_with_its_updraft() {
+        for (role, wanted) in [(Role::ThrustExpo, 0.4), (Role::InflowShare, 0.26)] {
+            let (size, updraft_mps, explains) = found_together(role, wanted);
+            assert!((size - wanted).abs() < 0.05, "{role:?} {size}");
+            assert!((updraft_mps + 1.6).abs() < 0.15, "{role:?} {updraft_mps}");
+            assert!(explains, "{role:?}");
+        }
+    }
+
+    #[test]
+    fn a_model_that_has_the_effect_is_held_against_its_own() {
+        let (data, simulated) = (trial::data(4, |_, _| 0.0), Simulated::Closed);
+        let (options, flights) = (Options::default(), ModelFlights::default());
+        for (role, size) in [(Role::ThrustExpo, 0.4), (Role::InflowShare, 0.26)] {
+            let mut known = trial::vehicle();
+            role.set(&mut known, size);
+            let comparison = Comparison::new(&data, &known, &simulated, None).unwrap();
+            let search = begun(&data, &known, (&simulated, &options, &flights), comparison);
+            assert!(search.bends_most(role.place().unwrap().name(), 0.0).is_none(), "{role:?}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::super::candidates::{
-    Candidate, Updraft, axial_drag, library, of_the_air, one, read_otherwise,
+    Candidate, Updraft, Variant, axial_drag, form_of, library, of_the_air, one, read_otherwise, set,
 };
 use super::super::error::GapError;
 use super::super::generic::{Generic, all};
@@ -13,7 +13,7 @@ use super::super::noise::GroupPattern;
 use super::super::refine::{self, slopes};
 use super::super::response::gusts_mps;
 use super::super::search::{
-    Based, FLOOR_NATS, FREE_FLOOR_NATS, Round, Sought, based, gains_at_once, round_on,
+    Based, FLOOR_NATS, FREE_FLOOR_NATS, Ranked, Round, Sought, based, gains_at_once, round_on,
 };
 use super::{MOST_GUSTS_MPS, Search};
 use crate::effects::Role;
@@ -32,6 +32,11 @@ pub(super) enum In<'a> {
 const MOST_NATS: f64 = 300.0;
 /// See [`MOST_NATS`].
 const MOST_TIMES: f64 = 4.0;
+
+/// How often a size is fitted. Numerical: the sizes that are tried are within some times the right one, and each fit is much nearer.
+const SIZES: usize = 3;
+/// Sizes that differ by less are the same, as a share of what is new in one. Numerical.
+const SAME_SIZE: f64 = 0.01;
 
 /// A flight as it is seen before anything is sought in it.
 #[derive(Clone, Debug)]
@@ -139,6 +144,41 @@ impl Search<'_> {
         self.look_at(seen)
     }
 
+    /// A look with the effect that explains most in the size that does so: those that are tried are far apart, and where air and
+    /// noise are small a multiple of one is no other.
+    pub(super) fn at_fitted_size(&self, mut look: Look) -> Result<Look, GapError> {
+        for _ in 0..SIZES {
+            let Some((candidate, form)) = self.fitted_form(&look)? else { break };
+            look.candidates[candidate].variants = vec![form];
+            look.round = OnceLock::new();
+        }
+        Ok(look)
+    }
+
+    /// The form of the effect that explains most in the size that its best form says, and that effect's place; `None`: it has that size,
+    /// explains too little to be found, or the vehicle cannot fly so.
+    fn fitted_form(&self, look: &Look) -> Result<Option<(usize, Variant)>, GapError> {
+        let is_much = |best: &&Ranked| best.gain.max(best.plain) > FLOOR_NATS;
+        let Some(best) = look.round().library.first().filter(is_much) else { return Ok(None) };
+        let candidate = &look.candidates[best.candidate];
+        let variant = &candidate.variants[best.variant];
+        let (Some(size), Some(vehicle), None) =
+            (candidate.size, &variant.vehicle, variant.updraft_mps)
+        else {
+            return Ok(None);
+        };
+        let by = variant.size - size.now;
+        let fitted = (size.now + best.beta * by).clamp(size.low, size.high);
+        if (fitted - variant.size).abs() < SAME_SIZE * by.abs() {
+            return Ok(None);
+        }
+        let mut with = vehicle.clone();
+        set(&mut with, candidate.name, size.name, fitted);
+        let there = form_of(&with, fitted, (&self.found.vehicle, &self.comparison))?;
+        let Variant { form, price_nats, .. } = *variant;
+        Ok(there.map(|there| (best.candidate, Variant { form, price_nats, ..there })))
+    }
+
     fn seen(&mut self, updraft: In<'_>) -> Result<Seen, GapError> {
         let Self { comparison, found, .. } = self;
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
@@ -212,6 +252,7 @@ mod tests {
     use super::super::tests::begun;
     use super::super::{Only, Options};
     use super::*;
+    use crate::effects::{Model, Signals};
 
     #[test]
     fn effects_that_are_each_searched_for_alone_see_the_same_flight() {
@@ -243,5 +284,43 @@ mod tests {
         let seen = Seen { based: None, ..looks[0].seen.as_ref().clone() };
         let anew = Look { seen: Arc::new(seen), round: OnceLock::new(), ..looks[0].clone() };
         assert_eq!(anew.round().best().to_bits(), round.best().to_bits());
+    }
+
+    #[test]
+    fn an_effect_is_looked_at_in_the_size_that_explains_most() {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let drag = Role::BodyDragTop.place().unwrap().name();
+        let mut with = vehicle.clone();
+        set(&mut with, drag, Role::BodyDragTop.place().unwrap().parameter.name, 0.4);
+        let [plain, with] = [&vehicle, &with].map(|one| Model::of(one).unwrap());
+        let data = trial::data(4, |drone, bin| {
+            let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+            let signals = Signals { climb_mps: bin.climb_mps(), ..here };
+            let ripple_us = 0.1 * f64::from((7 * bin.segment as i32 + 3 * drone as i32) % 5 - 2);
+            with.pulse_us(&signals) - plain.pulse_us(&signals) + ripple_us
+        });
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let flights = ModelFlights::default();
+        let look = |effect| {
+            let only = Some(Only { effect, updraft_mps: 0.0, beaten_nats: 0.0, is_bent: false });
+            let options = Options { only, ..Options::default() };
+            let given = (&simulated, &options, &flights);
+            let mut search = begun(&data, &vehicle, given, comparison.clone());
+            let before = search.look_at_beginning().unwrap();
+            let after = search.at_fitted_size(before.clone()).unwrap();
+            (before, after)
+        };
+        let (before, after) = look(drag);
+        let nats = [&before, &after].map(|look| look.explained().nats);
+        assert!(nats[1] > nats[0] - 1.0, "{nats:?}");
+        assert!(before.round().library[0].beta > 2.0, "none of the sizes that are tried is near");
+        let best = &after.round().library[0];
+        let Candidate { size, variants, .. } = &after.candidates[best.candidate];
+        let fitted = variants[best.variant].size;
+        assert!((fitted - 0.4).abs() < 0.02, "{fitted}");
+        assert!((best.beta - 1.0).abs() < 0.05 && fitted < size.unwrap().high, "{}", best.beta);
+        // What explains too little keeps the sizes that are tried.
+        let (before, after) = look("battery");
+        assert_eq!(after.candidates[0].variants.len(), before.candidates[0].variants.len());
     }
 }
