@@ -280,9 +280,11 @@ mod tests {
     use super::*;
     use crate::vehicle::library::builtin;
 
-    /// Spreads of a known fleet, of what is hidden in it, and of inflow: relative.
+    /// Spread of thrust that the model states, relative.
     const KNOWN: f64 = 0.016;
+    /// Spread of what is hidden, relative.
     const HIDDEN: f64 = 0.05;
+    /// Spread of the inflow, relative.
     const INFLOW: f64 = 0.06;
     const DRONES: usize = 49;
 

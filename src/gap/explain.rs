@@ -325,7 +325,7 @@ struct Search<'a> {
     refused: Vec<&'static str>,
     /// The state before the last free shape, and how probable that was.
     last: Option<(Found, f64)>,
-    /// The curve that is looked for where it bends the response as another updraft does.
+    /// The effect that is looked for where it bends the response as another updraft does.
     bent: Option<Bent>,
 }
 

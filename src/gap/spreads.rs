@@ -1,4 +1,4 @@
-//! In what the drones of a vehicle differ by the model, and what that does to their pulses.
+//! How the drones of a vehicle differ by the model, and what that does to their pulses.
 
 use super::compare::{Comparison, LEAST_DOUBT_US};
 use super::data::Group;
@@ -16,12 +16,12 @@ const USUAL_INFLOW_SPREAD: f64 = 0.055;
 pub(super) struct Spread {
     effect: String,
     parameter: &'static str,
-    /// Relative standard deviation.
+    /// Standard deviation, in the parameter's unit.
     size: f64,
 }
 
 impl Spread {
-    /// Everything in which a vehicle's drones differ.
+    /// Every way in which a vehicle's drones differ.
     pub(super) fn all_of(vehicle: &Vehicle) -> Vec<Self> {
         let mut found = Vec::new();
         for (name, table) in vehicle.effects.iter().filter(|(_, table)| table.on) {
@@ -38,7 +38,7 @@ impl Spread {
         found
     }
 
-    /// In what drones of a vehicle differ besides, where nobody says by how much: no two rotors meet the air alike.
+    /// How drones of a vehicle differ besides that, where nobody says by how much: no two rotors meet the air alike.
     fn unsaid(vehicle: &Vehicle, said: &[Self]) -> Option<Self> {
         let place = Role::InflowSpread.place().filter(|_| Role::InflowSpread.is_on(vehicle))?;
         let is_said = said.iter().any(|spread| spread.effect == place.name());
@@ -126,23 +126,25 @@ impl Comparison {
         vehicle: &Vehicle,
         beside_hover_us: Vec<Vec<f64>>,
     ) -> Result<Vec<Differences>, EffectError> {
+        let said = self.by_spreads_us(vehicle, &self.spreads)?;
         let unsaid = Spread::unsaid(vehicle, &self.spreads);
-        let spreads: Vec<Spread> = self.spreads.iter().cloned().chain(unsaid).collect();
-        let ways = self.by_spreads_us(vehicle, &spreads)?;
+        // A drone that nobody spoke of need not be able to fly.
+        let unsaid = unsaid.and_then(|one| one.change_us(&self.scene_of(vehicle), vehicle).ok());
         let of_group = |((group, of), slope_us): ((usize, &Group), Vec<f64>)| {
             let drones = of.slots.len().max(1) as f64;
-            let of_one = |way: &Vec<Vec<f64>>| {
+            let of_one = |way: &Vec<Vec<f64>>| -> Vec<f64> {
                 way[group].iter().map(|value| value * drones.sqrt()).collect()
             };
-            let ways: Vec<Vec<f64>> = ways.iter().map(of_one).collect();
-            Differences::of(&ways, |values| of.in_hover(values), slope_us)
+            let said: Vec<Vec<f64>> = said.iter().map(of_one).collect();
+            let unsaid = unsaid.as_ref().map(of_one);
+            Differences::of(&said, unsaid.as_ref(), |values| of.in_hover(values), slope_us)
         };
         Ok(self.data.groups.iter().enumerate().zip(beside_hover_us).map(of_group).collect())
     }
 }
 
 /// In which two ways drones of a group differ.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Differences {
     /// Change of the pulse in each bin by what changes it by 1 us in hover; empty: the same in all.
     pub offset: Vec<f64>,
@@ -152,8 +154,13 @@ pub(super) struct Differences {
 
 impl Differences {
     /// Of the ways in which a vehicle lets drones differ, by one standard deviation in each bin, us: that which changes hovers most, and
-    /// much the same everywhere, and that which changes others beside hovers most; otherwise an offset, and `slope_us`.
-    fn of(ways: &[Vec<f64>], in_hover: impl Fn(&[f64]) -> f64, slope_us: Vec<f64>) -> Self {
+    /// much the same everywhere, and that which changes others beside hovers most, be it `unsaid`; otherwise an offset, and `slope_us`.
+    fn of(
+        ways: &[Vec<f64>],
+        unsaid: Option<&Vec<f64>>,
+        in_hover: impl Fn(&[f64]) -> f64,
+        slope_us: Vec<f64>,
+    ) -> Self {
         let rms = |values: &[f64]| rms(values).unwrap_or_default();
         // What goes with the climb more than it changes hovers is no offset.
         let is_offset = |way: &&Vec<f64>| {
@@ -169,7 +176,7 @@ impl Differences {
                 way.iter().map(|value| value / hover_us).collect()
             })
             .unwrap_or_default();
-        let others = ways.iter().filter(|way| most.is_none_or(|most| *way != most));
+        let others = ways.iter().filter(|way| most.is_none_or(|most| *way != most)).chain(unsaid);
         let beside = others.map(|way| {
             let hover_us = in_hover(way);
             let at = |bin: usize| offset.get(bin).copied().unwrap_or(1.0);
@@ -228,7 +235,7 @@ mod tests {
     fn drones_differ_as_the_vehicle_lets_them() {
         let differ = |ways: &[[f64; 3]]| {
             let ways: Vec<Vec<f64>> = ways.iter().map(|way| way.to_vec()).collect();
-            let found = Differences::of(&ways, |values| values[0], vec![0.0, 30.0, -40.0]);
+            let found = Differences::of(&ways, None, |values| values[0], vec![0.0, 30.0, -40.0]);
             (found.offset, found.slope_us)
         };
         assert_eq!(differ(&[]), (vec![], vec![0.0, 30.0, -40.0]));
@@ -244,6 +251,11 @@ mod tests {
         let (offset, slope_us) = differ(&[[5.0, 8.0, 1.0], thrust]);
         assert!(offset == [1.0, 1.1, 0.95] && slope_us[1] > 0.0, "{offset:?} {slope_us:?}");
         assert_eq!(differ(&[[5.0, 12.0, -4.0]]).0, [0.0; 0], "and is no offset alone");
+        // What nobody says is no offset, however much it changes hovers.
+        let unsaid = vec![5.0, 6.0, 4.0];
+        let beside =
+            Differences::of(&[], Some(&unsaid), |values| values[0], vec![0.0, 30.0, -40.0]);
+        assert!(beside.offset.is_empty() && (beside.slope_us[1] + beside.slope_us[2]).abs() < 1e-9);
         let (offset, slope_us) = differ(&[thrust]);
         assert_eq!((offset.len(), slope_us), (3, vec![0.0, 30.0, -40.0]), "one way is the offset");
     }

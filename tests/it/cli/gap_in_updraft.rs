@@ -2,9 +2,9 @@
 
 use super::support::Bench;
 
-/// Hides one effect in steady air without wind, and says what it was named and whether its size and the updraft are inside their
+/// Hides one effect in steady air without wind, and expects it to be named, with its size and the updraft inside their
 /// intervals. Without wind the updraft is known from nothing but that bend.
-fn is_named(
+fn expect_named(
     (vehicle, protocol): (&str, &str),
     updraft: f64,
     (effect, hidden, size): (&str, &str, f64),
@@ -31,13 +31,13 @@ fn is_named(
 /// A curve in -2 m/s was taken for still air, and nothing.
 #[test]
 fn a_curve_of_the_thrust_is_named_with_the_updraft_that_it_was_flown_in() {
-    is_named(("pixel", "paper"), -2.0, ("thrust-curve", "0.5", 0.5));
+    expect_named(("pixel", "paper"), -2.0, ("thrust-curve", "0.5", 0.5));
 }
 
 /// Inflow in -1.5 m/s was something unknown of the climb in -3.6 m/s, and a share of 0.15 without the induced velocity while the
 /// drones could not differ in it.
 #[test]
 fn inflow_is_named_with_the_updraft_that_it_was_flown_in() {
-    // 18 us/(m/s) at hover.
-    is_named(("airsim-generic-quad", "enhanced"), -1.5, ("rotor-inflow", "18", 0.2628));
+    // The share that 18 us/(m/s) in hover are.
+    expect_named(("airsim-generic-quad", "enhanced"), -1.5, ("rotor-inflow", "18", 0.2628));
 }
