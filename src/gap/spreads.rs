@@ -42,10 +42,11 @@ impl Spread {
     fn unsaid(vehicle: &Vehicle, said: &[Self]) -> Option<Self> {
         let place = Role::InflowSpread.place().filter(|_| Role::InflowSpread.is_on(vehicle))?;
         let is_said = said.iter().any(|spread| spread.effect == place.name());
-        let parameter = place.parameter.name;
-        let of_usual =
-            || Self { effect: place.name().to_owned(), parameter, size: USUAL_INFLOW_SPREAD };
-        (!is_said).then(of_usual)
+        (!is_said).then(|| Self {
+            effect: place.name().to_owned(),
+            parameter: place.parameter.name,
+            size: USUAL_INFLOW_SPREAD,
+        })
     }
 
     /// Change of the pulse when the mean of each group's drones is one standard deviation above the fleet's, by group and bin, us.
@@ -72,13 +73,12 @@ impl Comparison {
 
     /// Change of the pulse by one standard deviation of the mean of each group's drones, for everything in which drones
     /// differ by the model, by group and bin, us.
-    fn by_spreads_us(
-        &self,
-        vehicle: &Vehicle,
-        spreads: &[Spread],
-    ) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+    fn by_spreads_us(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        if self.spreads.is_empty() {
+            return Ok(Vec::new());
+        }
         let scene = self.scene_of(vehicle);
-        spreads.iter().map(|spread| spread.change_us(&scene, vehicle)).collect()
+        self.spreads.iter().map(|spread| spread.change_us(&scene, vehicle)).collect()
     }
 
     /// Change of the pulse by one standard deviation of the mean of each group's drones, for everything in which drones
@@ -88,7 +88,7 @@ impl Comparison {
     /// Effects of the vehicle that are not valid.
     pub(super) fn spread_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
         let mut doubts = Vec::new();
-        for change_us in self.by_spreads_us(vehicle, &self.spreads)? {
+        for change_us in self.by_spreads_us(vehicle)? {
             let change = Column::Shared(change_us);
             let of_group = |group: usize| {
                 change.each(
@@ -109,7 +109,7 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub(super) fn offsets_us(&self, vehicle: &Vehicle) -> Result<f64, EffectError> {
-        let ways = self.by_spreads_us(vehicle, &self.spreads)?;
+        let ways = self.by_spreads_us(vehicle)?;
         let variance = |(group, of): (usize, &Group)| -> f64 {
             let of_mean = |way: &Vec<Vec<f64>>| mean(&way[group]).unwrap_or_default();
             of.slots.len() as f64 * ways.iter().map(|way| of_mean(way).powi(2)).sum::<f64>()
@@ -126,7 +126,7 @@ impl Comparison {
         vehicle: &Vehicle,
         beside_hover_us: Vec<Vec<f64>>,
     ) -> Result<Vec<Differences>, EffectError> {
-        let said = self.by_spreads_us(vehicle, &self.spreads)?;
+        let said = self.by_spreads_us(vehicle)?;
         let unsaid = Spread::unsaid(vehicle, &self.spreads);
         // A drone that nobody spoke of need not be able to fly.
         let unsaid = unsaid.and_then(|one| one.change_us(&self.scene_of(vehicle), vehicle).ok());
