@@ -25,6 +25,8 @@ const SETTLED_MPS: f64 = 0.02;
 const OTHER_START_NATS: f64 = 100.0;
 /// What is fitted together with the updraft, where the model has none.
 const BENDING: [Role; 2] = [Role::ThrustExpo, Role::InflowShare];
+/// To which sides of still air a fit begins.
+const SIDES: [f64; 2] = [-1.0, 1.0];
 /// How often the model with the effect is flown where closed forms lead to. Numerical: they are off by some tenths of a metre per second
 /// from afar.
 const FLIGHTS: usize = 3;
@@ -32,10 +34,13 @@ const FLIGHTS: usize = 3;
 /// An effect in one of its forms, fitted where its search begins.
 struct Begun {
     found: Found,
-    flown: Comparison,
     form: Form,
     /// How likely the flight is, nats but for a constant.
     likely: f64,
+    /// Updraft that it was fitted in, m/s.
+    start_mps: f64,
+    /// Updraft that explains most, as far as the slopes at that one tell, m/s.
+    most_mps: f64,
 }
 
 /// Which form of an effect it is, and what that costs.
@@ -80,7 +85,7 @@ impl Search<'_> {
             return None;
         }
         let begun: Vec<Begun> =
-            UPDRAFTS_MPS.par_iter().flat_map(|start| self.begins_bent(effect, *start)).collect();
+            SIDES.par_iter().flat_map(|sign| self.begins_on_a_side(effect, *sign)).collect();
         let most = begun.iter().map(|one| one.likely).fold(f64::NEG_INFINITY, f64::max);
         let near = begun.into_par_iter().filter(|one| one.likely > most - OTHER_START_NATS);
         let found: Vec<Bent> = near.filter_map(|one| self.bent_from(effect, one)).collect();
@@ -94,8 +99,23 @@ impl Search<'_> {
         (best.raw_us * NEAR < nearest_us).then_some(best)
     }
 
-    /// Each form of the effect fitted in one of the updrafts that are begun from; empty: the vehicle cannot fly so.
-    fn begins_bent(&self, effect: &'static str, start_mps: f64) -> Vec<Begun> {
+    /// Each form of the effect fitted in updrafts of one sign: in a farther one only where the slopes at the nearer one lead away from still air.
+    fn begins_on_a_side(&self, effect: &'static str, sign: f64) -> Vec<Begun> {
+        let mut begun: Vec<Begun> = Vec::new();
+        for start_mps in UPDRAFTS_MPS.into_iter().filter(|mps| sign * mps > 0.0) {
+            let leads_on = |one: &Begun| sign * (one.most_mps - one.start_mps) > 0.0;
+            if !begun.is_empty() && !begun.iter().any(leads_on) {
+                break;
+            }
+            let noise = begun.first().map(|one| one.found.noise.clone()).unwrap_or_default();
+            begun.extend(self.begins_bent(effect, start_mps, noise));
+        }
+        begun
+    }
+
+    /// Each form of the effect fitted in one of the updrafts that are begun from, with a noise to begin with; empty: the vehicle
+    /// cannot fly so.
+    fn begins_bent(&self, effect: &'static str, start_mps: f64, mut noise: Start) -> Vec<Begun> {
         let Ok(flown) = self.flown_in(start_mps) else { return Vec::new() };
         if flown.data.bins_of_groups() != self.comparison.data.bins_of_groups() {
             return Vec::new();
@@ -120,22 +140,28 @@ impl Search<'_> {
             bounds: (size.low, size.high),
             before: None,
         };
+        // Without the effect the noise is larger, so the first form begins from the usual one, and others with that of the first.
         let begun = |variant: &Variant| {
             let vehicle = variant.vehicle.clone()?;
+            let parameters = vec![parameter.clone()];
             let mut found =
-                Found { vehicle, parameters: vec![parameter.clone()], ..self.found.clone() };
-            found.noise = Start::default();
+                Found { vehicle, parameters, noise: noise.clone(), ..self.found.clone() };
             let form = Form { value: variant.form, price_nats: variant.price_nats };
-            let likely = fits(&mut found, &flown)?.likely - form.price_nats;
-            Some(Begun { found, flown: flown.clone(), form, likely })
+            let InUpdraft { likely, most_mps, .. } = fits(&mut found, &flown)?;
+            noise.clone_from(&found.noise);
+            Some(Begun { found, form, likely: likely - form.price_nats, start_mps, most_mps })
         };
         nearest.into_iter().filter_map(begun).collect()
     }
 
     fn bent_from(&self, effect: &'static str, begun: Begun) -> Option<Bent> {
-        let Begun { mut found, mut flown, form, .. } = begun;
+        let Begun { mut found, form, start_mps, .. } = begun;
+        let mut flown = self.flown_in(start_mps).ok()?;
         for flight in 0..FLIGHTS {
             let updraft_mps = settles(&mut found, &flown)?;
+            if flight > 0 && (updraft_mps - flown.scene.updraft_mps).abs() < SETTLED_MPS {
+                break;
+            }
             if flight == 0 {
                 let nats = explains(&found, &flown.in_updraft(updraft_mps))? - form.price_nats;
                 if self.options.only.is_some_and(|only| only.is_out_of_reach(nats)) {
@@ -198,9 +224,22 @@ fn explains(found: &Found, flown: &Comparison) -> Option<f64> {
     Some(likely_if(flown, &found.vehicle, &doubts, noise)? - FLOOR_NATS)
 }
 
-/// Fits an effect's size in the updraft of a comparison, by closed forms.
+/// Fits an effect's size and the noise in the updraft of a comparison, by closed forms.
 fn fits(found: &mut Found, there: &Comparison) -> Option<InUpdraft> {
     found.refit(there).ok()?;
+    most_beside(found, there)
+}
+
+/// Fits an effect's size there in the noise that is known.
+fn fits_size(found: &mut Found, there: &Comparison) -> Option<InUpdraft> {
+    let Found { vehicle, parameters, noise, gusts_mps, .. } = &*found;
+    let fit = refine::refine(there, vehicle, parameters, &[], noise, *gusts_mps, false).ok()?;
+    (found.vehicle, found.values) = (fit.vehicle, fit.values);
+    most_beside(found, there)
+}
+
+/// The updraft that explains most beside that of a comparison.
+fn most_beside(found: &Found, there: &Comparison) -> Option<InUpdraft> {
     let patterns = there.patterns(&found.vehicle, found.gusts_mps).ok()?;
     let free = slopes(there, &found.vehicle, &found.parameters).ok()?;
     let updraft_mps = there.scene.updraft_mps;
@@ -210,8 +249,10 @@ fn fits(found: &mut Found, there: &Comparison) -> Option<InUpdraft> {
 /// Fits an effect's size and the updraft beside a flight, by closed forms: that updraft, m/s; `None`: the vehicle cannot fly so.
 fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
     let mut updraft_mps = flown.scene.updraft_mps;
-    for _ in 0..UPDRAFT_ROUNDS {
-        let here = fits(found, &flown.clone().in_updraft(updraft_mps))?;
+    for round in 0..UPDRAFT_ROUNDS {
+        let there = flown.clone().in_updraft(updraft_mps);
+        // The noise is what the model leaves, which changes less than the updraft.
+        let here = if round == 0 { fits(found, &there)? } else { fits_size(found, &there)? };
         let step_mps = here.most_mps - updraft_mps;
         updraft_mps += step_mps.clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
         if step_mps.abs() < SETTLED_MPS {
