@@ -389,6 +389,11 @@ impl Comparison {
                         .collect(),
                     offset,
                     slope_us,
+                    unsteady_us: if self.is_flown {
+                        self.closure_us[group].clone()
+                    } else {
+                        Vec::new()
+                    },
                 }
             })
             .collect())

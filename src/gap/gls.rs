@@ -363,9 +363,10 @@ impl<'a> Problem<'a> {
                 side_response,
                 offset,
                 slope_us,
+                unsteady_us,
             } = group;
             digest.add(*drones as u64);
-            for values in [time_s, height_m, shift_mps, bent_us, offset, slope_us] {
+            for values in [time_s, height_m, shift_mps, bent_us, offset, slope_us, unsteady_us] {
                 digest.add_all(values);
             }
             digest.add_all(response.iter().flat_map(Response::values));
@@ -782,6 +783,7 @@ mod tests {
         }
         for group in &mut curved {
             group.offset = group.time_s.iter().map(|time_s| 1.0 + 0.1 * time_s.cos()).collect();
+            group.unsteady_us = group.time_s.iter().map(|time_s| 20.0 * time_s.sin()).collect();
         }
         problem.groups = &curved;
         let mut hyper = Hyper::default();
