@@ -64,10 +64,10 @@ pub fn run(
     let mut draws: Vec<(usize, Draw)> = settings.draws()?.into_iter().enumerate().collect();
     draws.retain(|(index, _)| share.takes(*index));
     create_folder(&place.folder.join("flights"))?;
-    let finished: Vec<Option<FlightResult>> = draws
-        .par_iter()
-        .map(|(index, draw)| finished(place, *index, draw, made_by))
-        .collect::<Result<_, _>>()?;
+    let read: Vec<_> =
+        draws.par_iter().map(|(index, draw)| finished(place, *index, draw, made_by)).collect();
+    // Of several that are not of this table always the first is told.
+    let finished = read.into_iter().collect::<Result<Vec<_>, _>>()?;
     place.sweep();
     // A disk that is full fills for no flight after it.
     let is_unwritable = AtomicBool::new(false);
