@@ -27,7 +27,7 @@ const OTHER_START_NATS: f64 = 100.0;
 const BENDING: [Role; 2] = [Role::ThrustExpo, Role::InflowShare];
 /// To which sides of still air a fit begins.
 const SIDES: [f64; 2] = [-1.0, 1.0];
-/// How often the model with the effect is flown where closed forms lead to. Numerical: they are off by some tenths of a metre per second
+/// How often the model with the effect is flown where closed forms lead to, at most. Numerical: they are off by some tenths of a metre per second
 /// from afar.
 const FLIGHTS: usize = 3;
 
@@ -99,7 +99,8 @@ impl Search<'_> {
         (best.raw_us * NEAR < nearest_us).then_some(best)
     }
 
-    /// Each form of the effect fitted in updrafts of one sign: in a farther one only where the slopes at the nearer one lead away from still air.
+    /// Each form of the effect fitted in updrafts of one sign: in a farther one only where the slopes at the nearer one lead away from
+    /// still air, or where nothing flies in that.
     fn begins_on_a_side(&self, effect: &'static str, sign: f64) -> Vec<Begun> {
         let mut begun: Vec<Begun> = Vec::new();
         for start_mps in UPDRAFTS_MPS.into_iter().filter(|mps| sign * mps > 0.0) {
