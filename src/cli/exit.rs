@@ -80,7 +80,7 @@ pub fn exit_of(error: &CommandError) -> Exit {
             GapError::NoSimulatedSide | GapError::OtherPlan { .. } | GapError::Effect(_) => {
                 Exit::Usage
             }
-            GapError::Simulation(_) => Exit::Failed,
+            GapError::Simulation(_) | GapError::InReadWind { .. } => Exit::Failed,
             _ => Exit::Nothing,
         },
         E::Compare(CompareError::NothingInCommon { .. } | CompareError::Nothing { .. }) => {

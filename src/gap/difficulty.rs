@@ -42,7 +42,7 @@ pub fn fisher_z(
 ) -> Result<Vec<Option<f64>>, GapError> {
     let plan = input.plan.ok_or(GapError::NoSimulatedSide)?;
     let exponent = thrust_exponent(input.vehicle);
-    let (data, _) = Data::of_plan(plan, input.flown, exponent).split();
+    let (data, _) = Data::of_plan(plan, input.flown, exponent).settled().split();
     let simulated = Simulated::Refly(plan);
     let comparison =
         Comparison::of(&data, input.vehicle, &simulated, input.plan, updraft_mps, None)?;

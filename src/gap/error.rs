@@ -70,6 +70,19 @@ pub enum GapError {
     /// The model could not be flown.
     #[error("the model's flight failed")]
     Simulation(#[from] SimError),
+    /// The model could not be flown in the wind that only leans tell, by its own drag.
+    #[error(
+        "the model cannot fly in the {wind_mps:.0} m/s of wind that the drones' leans say by its own drag: they lean by a drag \
+         that it lacks, or the air was more than it can hold. Which it was is told by horizontal legs of known speed \
+         (updraft plan calibration-counterphase)"
+    )]
+    InReadWind {
+        /// The wind that the leans say, m/s.
+        wind_mps: f64,
+        /// Why the flight failed.
+        #[source]
+        source: SimError,
+    },
     /// The template of a proposed flight is not valid.
     #[error("the proposed flight cannot be planned for this fleet")]
     Mission(#[from] Box<MissionError>),
@@ -79,6 +92,14 @@ pub enum GapError {
 }
 
 impl GapError {
+    /// The same of a flight in a wind that only leans tell.
+    pub(super) fn in_read_wind(self, wind_mps: f64) -> Self {
+        match self {
+            Self::Simulation(source) => Self::InReadWind { wind_mps, source },
+            other => other,
+        }
+    }
+
     /// Whether it is that the vehicle cannot fly as it would have to: not steadily, or not the plan in that air.
     pub(super) fn is_not_flown(&self) -> bool {
         matches!(

@@ -490,9 +490,10 @@ impl Search<'_> {
             }
             found.vehicle = next;
             found.noise = best.noise.clone();
-            found.refit(comparison)?;
-            if let Some(bent) = self.bent.take() {
-                bent.taken_by(found, candidate.name);
+            match self.bent.take().filter(|bent| bent.is_of(candidate.name)) {
+                // The flight without it may be too far from that with it to fit it there.
+                Some(bent) => bent.taken_by(found),
+                None => found.refit(comparison)?,
             }
         } else {
             found.extras.push(variant.column.clone());

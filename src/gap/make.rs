@@ -1,7 +1,7 @@
 //! Steps from logs to a verdict and a model.
 
 use super::bins::Bin;
-use super::compare::{Comparison, Simulated};
+use super::compare::{Comparison, Simulated, amsl_m, lean_law};
 use super::data::{Data, Flown, constant_us};
 use super::dependence::Dependence;
 use super::detectable::detectable;
@@ -10,6 +10,7 @@ use super::error::GapError;
 use super::explain::{Found, Options};
 use super::heldout::same_bins;
 use super::kept::{Question, grows};
+use super::lean::mean_wind;
 use super::left_out::LeftOut;
 use super::model_flights::ModelFlights;
 use super::noise::{
@@ -18,12 +19,13 @@ use super::noise::{
 };
 use super::other_plan::without_strangers;
 use super::refine::Parameter;
+use super::refly::mean_drone;
 use super::regimes::regimes;
 use super::sensor::sensor;
 use super::stand_in::{as_in_file, read_from_logs, stand_in};
 use super::verdict::{
     DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
-    VERDICT_SCHEMA, Verdict,
+    VERDICT_SCHEMA, Verdict, is_strong_wind,
 };
 use super::warning::{Warning, warnings};
 use super::words::summary;
@@ -90,6 +92,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     if let (0, Some(value_us)) = (data.drones(), constant) {
         return Err(GapError::ConstantPulse { value_us });
     }
+    let data = data.settled();
     let stood_in: Vehicle;
     let mut vehicle = input.vehicle;
     let simulated = match (input.simulated, input.plan) {
@@ -113,7 +116,8 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     // A sensor that is off is repaired first: the pulse is then compared at the right speeds. So is a
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
-    let before = Comparison::new(&data, vehicle, &simulated, input.plan)?;
+    let before = Comparison::new(&data, vehicle, &simulated, input.plan)
+        .map_err(|error| of_read_wind(error, &data, vehicle, input.plan))?;
     let wind = super::lean_channel::found(&before);
     let mut leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(vehicle, &channel);
@@ -258,6 +262,17 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         model = self::repaired(&model, &verdict.sensor);
     }
     Ok(Explained { verdict, model, found })
+}
+
+/// Why the model cannot fly, where that may be the wind that its drag says without being told.
+fn of_read_wind(error: GapError, data: &Data, vehicle: &Vehicle, plan: Option<&Plan>) -> GapError {
+    let has_legs = data.groups.iter().flat_map(|group| &group.bins).any(Bin::is_horizontal);
+    let law = lean_law(&mean_drone(vehicle), amsl_m(plan), 0.0);
+    let wind_mps = mean_wind(data, law, None);
+    if has_legs || !error.is_not_flown() || !is_strong_wind(wind_mps) {
+        return error;
+    }
+    error.in_read_wind(wind_mps[0].hypot(wind_mps[1]))
 }
 
 fn noise(found: &Found) -> Result<Noise, GapError> {

@@ -59,6 +59,7 @@ mod together;
 #[cfg(test)]
 mod trial;
 mod unplanned;
+mod unsettled;
 mod updraft_error;
 pub mod verdict;
 mod warning;

@@ -266,9 +266,9 @@ fn beside_a_shape_that_is_left(steps: &mut [Step], rest: &Rest, depends_on: Depe
     }
 }
 
-/// Momentum drag where no leg of known speed over ground told the wind. Along the rotors' axis it is inflow, which it is told
-/// with; ArduPilot's own frame has it by its equations. In wind a body's drag is of the same form, as the square of a speed
-/// that hardly changes is, and each reads another wind from the leans.
+/// A drag of the rotors where no leg of known speed over ground told the wind. Momentum drag is inflow along the rotors' axis, which it
+/// is told with; ArduPilot's own frame has it by its equations. In wind a body's drag is of the same form as either, as the square of a
+/// speed that hardly changes is, and each reads another wind from the leans.
 fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
     let comparison = &found.comparison;
     if comparison.is_foreign() || comparison.wind.measured.is_some() {
@@ -276,16 +276,29 @@ fn beside_inflow_and_drag_of_the_body(found: &mut Found) {
     }
     let [x_mps, y_mps] = comparison.wind.mean_mps;
     let is_windy = x_mps.hypot(y_mps) >= LEAST_WIND_MPS;
-    let inflow = found.vehicle.airframe.sitl.is_none().then_some(Role::InflowShare);
-    let bodies = is_windy.then_some([Role::BodyDragTop, Role::FaceDragTop]);
-    let roles = inflow.into_iter().chain(bodies.into_iter().flatten());
-    let others: Vec<String> =
-        roles.filter_map(Role::place).map(|place| place.name().to_owned()).collect();
+    let names = |roles: &[Role]| -> Vec<String> {
+        roles.iter().filter_map(|role| role.place()).map(|place| place.name().to_owned()).collect()
+    };
+    let bodies = if is_windy { names(&[Role::BodyDragTop, Role::FaceDragTop]) } else { Vec::new() };
+    let has_own = found.vehicle.airframe.sitl.is_some();
+    let inflow = if has_own { Vec::new() } else { names(&[Role::InflowShare]) };
     for step in &mut found.steps {
         if new_name(step).is_some_and(|effect| Role::MomentumDrag.is_of(effect)) {
-            doubt(step, others.iter().cloned());
+            doubt(step, inflow.iter().chain(&bodies).cloned());
+        } else if step.finding.effects().first().is_some_and(|first| Role::RotorDrag.is_of(first)) {
+            // A class already: it lies across the rotors only, or along them as well.
+            join(step, &bodies);
         }
     }
+}
+
+/// Adds names to a class, or makes one of a name.
+fn join(step: &mut Step, others: &[String]) {
+    let Finding::Class { effects, .. } = &mut step.finding else {
+        return doubt(step, others.iter().cloned());
+    };
+    let new: Vec<String> = others.iter().filter(|one| !effects.contains(one)).cloned().collect();
+    effects.extend(new);
 }
 
 /// Names of what was found after a class, and depends on the same: which effect the class is decides what form of it was taken
@@ -718,6 +731,13 @@ mod tests {
     }
 
     #[test]
+    fn a_class_is_joined_by_who_is_not_in_it() {
+        let mut both = step(class(&["blade-flapping", "momentum-drag"]), 20.0, 13.0, &[]);
+        join(&mut both, &["momentum-drag".to_owned(), "face-drag".to_owned()]);
+        assert_eq!(told(&[both]), ["blade-flapping momentum-drag face-drag"]);
+    }
+
+    #[test]
     fn momentum_drag_without_legs_may_be_inflow_and_a_bodys() {
         let data = trial::data(2, |_, _| 0.0);
         let of_vehicle = |vehicle: &str, effect: &str, wind_mps: [f64; 2], measured: bool| {
@@ -741,6 +761,9 @@ mod tests {
         let calm = of("momentum-drag", [1.0, -1.0], false);
         assert_eq!(calm, "momentum-drag rotor-inflow", "hardly any wind");
         assert_eq!(of("rotor-inflow", wind, false), "rotor-inflow");
+        let across = "blade-flapping parasitic-drag face-drag";
+        assert_eq!(of("blade-flapping", wind, false), across);
+        assert_eq!(of("blade-flapping", wind, true), "blade-flapping", "legs told the wind");
         let own = of_vehicle("arducopter-sitl", "momentum-drag", [1.0, -1.0], false);
         assert_eq!(own, "momentum-drag", "the frame of ArduPilot's simulator has it on all axes");
     }

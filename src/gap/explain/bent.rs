@@ -1,4 +1,5 @@
-//! An effect that bends the response beside the updraft of the whole flight, which bends it, too: a curve of the thrust, or inflow.
+//! An effect that bends the response beside the updraft of the whole flight, which bends it, too: a curve of the thrust, inflow, or, in a
+//! strong wind that only leans tell, a drag of the body.
 //!
 //! Without the effect, another updraft can stand for it, and from there no line leads to both: the noise without it is larger, and
 //! another size no multiple of one. So size and updraft are fitted together, by the closed forms, from afar.
@@ -11,6 +12,7 @@ use super::super::error::GapError;
 use super::super::gls::Start;
 use super::super::refine::{self, Parameter, slopes};
 use super::super::search::FLOOR_NATS;
+use super::super::verdict::is_strong_wind;
 use super::in_updraft::{
     InUpdraft, NEAR, UPDRAFT_ROUNDS, UPDRAFT_STEP_MPS, UPDRAFTS_MPS, likely_if,
 };
@@ -25,11 +27,16 @@ const SETTLED_MPS: f64 = 0.02;
 const OTHER_START_NATS: f64 = 100.0;
 /// What is fitted together with the updraft, where the model has none.
 const BENDING: [Role; 2] = [Role::ThrustExpo, Role::InflowShare];
+/// So is this one in a strong wind that no leg told: the drag says, too, how strong it is.
+const BENDING_IN_WIND: Role = Role::BodyDragTop;
 /// To which sides of still air a fit begins.
 const SIDES: [f64; 2] = [-1.0, 1.0];
 /// How often the model with the effect is flown where closed forms lead to, at most. Numerical: they are off by some tenths of a metre per second
 /// from afar.
-const FLIGHTS: usize = 3;
+const FLIGHTS: usize = 4;
+/// How far from the updraft of a flight closed forms are followed, m/s. Chosen: where a downdraft and a wind bring AirSim's quad with twice its
+/// drag to its limits, they led from -1 and from -2 m/s to -2.4 and -2.8 with half the size or twice it, and the next flights elsewhere.
+const REACH_MPS: f64 = 0.5;
 
 /// An effect in one of its forms, fitted where its search begins.
 struct Begun {
@@ -67,13 +74,16 @@ pub(super) struct Bent {
 }
 
 impl Bent {
-    /// Gives findings the effect as it was fitted together with the updraft, where it was taken up.
-    pub(super) fn taken_by(self, found: &mut Found, effect: &str) {
-        if effect == self.effect {
-            found.vehicle = self.vehicle;
-            found.noise = self.noise;
-            found.gusts_mps = self.gusts_mps;
-        }
+    /// Whether it is this effect.
+    pub(super) fn is_of(&self, effect: &str) -> bool {
+        effect == self.effect
+    }
+
+    /// Gives findings the effect as it was fitted together with the updraft.
+    pub(super) fn taken_by(self, found: &mut Found) {
+        found.vehicle = self.vehicle;
+        found.noise = self.noise;
+        found.gusts_mps = self.gusts_mps;
     }
 }
 
@@ -81,7 +91,7 @@ impl Search<'_> {
     /// The size and the updraft that explain the flight best, from some updrafts; `None`: the effect does not bend the response, the
     /// model has it, it can fly in none of them, or without it is as near to the logs in one of them or in another, m/s.
     pub(super) fn bends_most(&self, effect: &'static str, other_mps: f64) -> Option<Bent> {
-        if !BENDING.iter().any(|role| role.is_of(effect) && !role.is_on(&self.found.vehicle)) {
+        if !self.may_bend(effect) {
             return None;
         }
         let begun: Vec<Begun> =
@@ -97,6 +107,15 @@ impl Search<'_> {
         let each_us: Vec<f64> = updrafts_mps.par_iter().filter_map(without_us).collect();
         let nearest_us = each_us.into_iter().fold(f64::INFINITY, f64::min);
         (best.raw_us * NEAR < nearest_us).then_some(best)
+    }
+
+    /// Whether an effect is one that is fitted together with the updraft, and the model has none.
+    fn may_bend(&self, effect: &str) -> bool {
+        let wind = &self.comparison.wind;
+        let is_misread = wind.measured.is_none() && is_strong_wind(wind.mean_mps);
+        let in_wind = is_misread.then_some(BENDING_IN_WIND);
+        let role = BENDING.into_iter().chain(in_wind).find(|role| role.is_of(effect));
+        role.is_some_and(|role| !role.is_on(&self.found.vehicle))
     }
 
     /// Each form of the effect fitted in updrafts of one sign: in a farther one only where the slopes at the nearer one lead away from
@@ -213,6 +232,7 @@ impl Search<'_> {
             candidate.variants.extend(form.clone().map(of_form));
         }
         look.by_form_nats = Some(bent.nats);
+        look.fitted_as(&bent.noise);
         self.bent = Some(bent);
         Ok(Some(look))
     }
@@ -247,16 +267,20 @@ fn most_beside(found: &Found, there: &Comparison) -> Option<InUpdraft> {
     InUpdraft::fitted(there, &patterns, found, &free, &found.noise, updraft_mps)
 }
 
-/// Fits an effect's size and the updraft beside a flight, by closed forms: that updraft, m/s; `None`: the vehicle cannot fly so.
+/// Fits an effect's size and the updraft beside a flight, by closed forms, as far as these reach: that updraft, m/s; `None`: the
+/// vehicle cannot fly so.
 fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
-    let mut updraft_mps = flown.scene.updraft_mps;
+    let flown_mps = flown.scene.updraft_mps;
+    let mut updraft_mps = flown_mps;
     for round in 0..UPDRAFT_ROUNDS {
         let there = flown.clone().in_updraft(updraft_mps);
         // The noise is what the model leaves, which changes less than the updraft.
         let here = if round == 0 { fits(found, &there)? } else { fits_size(found, &there)? };
         let step_mps = here.most_mps - updraft_mps;
-        updraft_mps += step_mps.clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-        if step_mps.abs() < SETTLED_MPS {
+        let before_mps = updraft_mps;
+        updraft_mps = (updraft_mps + step_mps.clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS))
+            .clamp(flown_mps - REACH_MPS, flown_mps + REACH_MPS);
+        if (updraft_mps - before_mps).abs() < SETTLED_MPS {
             break;
         }
     }
@@ -266,11 +290,13 @@ fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::super::compare::Simulated;
+    use super::super::super::lean::{LeanLaw, Measured};
     use super::super::super::model_flights::ModelFlights;
     use super::super::super::trial;
     use super::super::Options;
     use super::super::tests::begun;
     use super::*;
+    use crate::base::air::SEA_LEVEL_DENSITY;
     use crate::effects::{Model, Signals};
 
     /// What is found of an effect in a flight in an updraft of -1.6 m/s with it, and whether the look there explains as much.
@@ -303,6 +329,45 @@ mod tests {
         let (size, updraft_mps, nats) = (found.size, found.updraft_mps, found.nats);
         let look = search.look_where_it_bends(found).unwrap().unwrap();
         (size, updraft_mps, look.explained().nats >= nats)
+    }
+
+    #[test]
+    fn a_drag_is_fitted_together_with_the_updraft_where_it_says_how_strong_the_wind_is() {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let data = trial::data(4, |_, _| 0.0);
+        let drag = Role::BodyDragTop.place().unwrap().name();
+        let may_bend = |known: &Vehicle, wind_mps: f64, is_told: bool| {
+            let (options, flights) = (Options::default(), ModelFlights::default());
+            let given = (&simulated, &options, &flights);
+            let mut comparison = Comparison::new(&data, known, &simulated, None).unwrap();
+            comparison.wind.mean_mps = [wind_mps, 0.0];
+            let law = LeanLaw::of(known, SEA_LEVEL_DENSITY, 0.0);
+            let told = Measured { law, linear_se: 0.001, misfit_nats: 0.0 };
+            comparison.wind.measured = is_told.then_some(told);
+            begun(&data, known, given, comparison).may_bend(drag)
+        };
+        assert!(may_bend(&vehicle, 8.0, false));
+        assert!(!may_bend(&vehicle, 3.0, false), "the wind is hardly misread");
+        assert!(!may_bend(&vehicle, 8.0, true), "legs tell the wind");
+        let mut known = vehicle.clone();
+        Role::BodyDragTop.set(&mut known, 0.1);
+        assert!(!may_bend(&known, 8.0, false), "the model has it");
+    }
+
+    #[test]
+    fn closed_forms_are_followed_no_farther_than_they_reach() {
+        let (vehicle, simulated) = (trial::vehicle(), Simulated::Closed);
+        let model = Model::of(&vehicle).unwrap();
+        let pulse_us = |climb_mps: f64| {
+            let here = Signals { height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+            model.pulse_us(&Signals { climb_mps, ..here })
+        };
+        // In sinking air of 1.6 m/s.
+        let data =
+            trial::data(4, |_, bin| pulse_us(bin.climb_mps() + 1.6) - pulse_us(bin.climb_mps()));
+        let flown = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let updraft_mps = settles(&mut Found::nothing(flown.clone()), &flown).unwrap();
+        assert!((updraft_mps + REACH_MPS).abs() < 1e-9, "{updraft_mps}");
     }
 
     #[test]

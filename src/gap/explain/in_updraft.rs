@@ -10,6 +10,7 @@ use super::super::noise::GroupPattern;
 use super::super::refine::{self, slopes};
 use super::super::response::{gusts_mps, settled};
 use super::super::search::{FLOOR_NATS, FREE_FLOOR_NATS};
+use super::bent::Bent;
 use super::{Found, In, Look, MOST_GUSTS_MPS, Only, SAME_GUSTS_MPS, Search};
 use crate::vehicle::Vehicle;
 
@@ -52,7 +53,9 @@ impl Search<'_> {
             }
         }
         let most = best.as_ref().map_or(f64::NEG_INFINITY, |((_, most), ..)| *most);
-        if let Some(bent) = bent.filter(|bent| bent.nats > most && bent.nats > only.beaten_nats) {
+        // It was flown, and the others are not yet.
+        let is_more = |bent: &Bent| bent.nats > (most - FLOOR_NATS).max(only.beaten_nats);
+        if let Some(bent) = bent.filter(is_more) {
             (self.comparison, self.found) = (first.clone(), begin.clone());
             if let Some(look) = self.look_where_it_bends(bent)? {
                 return Ok(Some(look));
