@@ -448,6 +448,7 @@ mod tests {
     use super::*;
     use crate::flight::{Flight, Series};
     use crate::gap::bins::BinValues;
+    use crate::sim::SimError;
 
     #[test]
     fn a_body_that_leans_told_is_round_and_new() {
@@ -550,6 +551,27 @@ mod tests {
         };
         let options = Options { replicates: 0, most_steps: 0, ..Options::default() };
         explain(&input, &options).unwrap()
+    }
+
+    #[test]
+    fn a_model_that_cannot_fly_in_the_wind_that_only_leans_tell_says_so() {
+        let told = |lean_rad: f64, has_leg: bool| {
+            let mut data = trial::data(2, |_, _| 0.0);
+            let values = data.groups[0].measured.iter_mut().flatten();
+            values.for_each(|values| values.lean_rad = [lean_rad, 0.0]);
+            if has_leg {
+                data.groups[0].bins[2].velocity_mps = [4.0, 0.0, 0.0];
+            }
+            let error = GapError::from(SimError::Diverged { drone: 6, time_s: 20.0 });
+            of_read_wind(error, &data, &trial::vehicle(), None).to_string()
+        };
+        let text = told(0.15, false);
+        assert!(
+            text.starts_with("the model cannot fly in the ") && text.contains("legs"),
+            "{text}"
+        );
+        assert_eq!(told(0.15, true), "the model's flight failed", "legs tell the wind");
+        assert_eq!(told(0.01, false), "the model's flight failed", "hardly any wind");
     }
 
     #[test]
