@@ -79,7 +79,7 @@ pub enum GapError {
     InReadWind {
         /// The wind that the leans say, m/s.
         wind_mps: f64,
-        /// Why the flight failed.
+        /// Failure of the flight.
         #[source]
         source: SimError,
     },
