@@ -10,12 +10,13 @@ use super::data::{Data, Group};
 use crate::numeric::mean;
 
 /// Drones have not settled where they scatter by so many times what they do in the rest of the leg. Measured: on AirSim's quad with twice
-/// its drag, in 8 m/s of wind and a downdraft of 2 m/s, two bins by 7.7 and 10.4 times, all others by 3.4 at most. Gusts that eight
-/// seconds remember make it 1.3.
+/// its drag, in 8 m/s of wind and a downdraft of 2 m/s, two bins by 7.7 and 10.4 times what they do in most, all others by 2.7 at most.
+/// Gusts that outlast a leg of three bins make it 1.3.
 const TIMES: f64 = 3.0;
 /// They scatter at least by so much, us: what nobody describes better (`noise.rs`).
 const LEAST_US: f64 = 0.2;
-/// Fewest drones that tell a scatter. Chosen: with six, by chance one bin in 500 is left out.
+/// Fewest drones that tell a scatter. Chosen: of six, one bin in 60 is left out by chance in legs of three bins, one in 2,000 in legs of
+/// five (drawn 40,000 times).
 const FEWEST_DRONES: usize = 6;
 /// Fewest other bins of a leg that tell what it is in the rest of the leg. Geometry: one has no scatter of its own.
 const FEWEST_OTHERS: usize = 2;
