@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 
-use super::bins::{Bin, BinValues};
+use super::bins::BinValues;
 use super::data::{Data, Group};
 use super::error::GapError;
 use super::generic::climb_shapes;
@@ -175,7 +175,7 @@ impl Comparison {
                 Simulated::Closed => Ok(data.as_flown()),
             }
         };
-        let moves = data.groups.iter().any(|group| group.bins.iter().any(Bin::is_horizontal));
+        let moves = data.has_legs();
         // What the legs say of the wind is better than what hovers say by the model's law alone.
         let mut flown_mps = match near.filter(|_| moves) {
             _ if !moves || !matches!(simulated, Simulated::Refly(_)) => first,

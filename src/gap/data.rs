@@ -125,6 +125,11 @@ impl Data {
         self.groups.iter().map(|group| group.bins.len()).collect()
     }
 
+    /// Whether anything is flown over ground.
+    pub(super) fn has_legs(&self) -> bool {
+        self.groups.iter().any(|group| group.bins.iter().any(Bin::is_horizontal))
+    }
+
     /// Drones in steady bins of the plan's groups.
     pub fn of_plan(plan: &Plan, flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
         let mut data = Self::default();

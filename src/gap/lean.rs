@@ -358,8 +358,7 @@ fn of_flights(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw) -> Vec<[f64; 2
 
 /// Standard error along an axis with which the leans of a flight that is yet to be flown will tell a mean wind, m/s.
 pub(super) fn told_within_mps(data: &Data, mean_mps: [f64; 2]) -> f64 {
-    let has_legs = data.groups.iter().flat_map(|group| &group.bins).any(Bin::is_horizontal);
-    let share = if has_legs { LEGS_DOUBT } else { LAW_DOUBT };
+    let share = if data.has_legs() { LEGS_DOUBT } else { LAW_DOUBT };
     LEAST_DOUBT_MPS.hypot(share * mean_mps[0].hypot(mean_mps[1]))
 }
 

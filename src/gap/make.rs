@@ -266,10 +266,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
 
 /// Why the model cannot fly, where that may be the wind that its drag says without being told.
 fn of_read_wind(error: GapError, data: &Data, vehicle: &Vehicle, plan: Option<&Plan>) -> GapError {
-    let has_legs = data.groups.iter().flat_map(|group| &group.bins).any(Bin::is_horizontal);
     let law = lean_law(&mean_drone(vehicle), amsl_m(plan), 0.0);
     let wind_mps = mean_wind(data, law, None);
-    if has_legs || !error.is_not_flown() || !is_strong_wind(wind_mps) {
+    if data.has_legs() || !error.is_not_flown() || !is_strong_wind(wind_mps) {
         return error;
     }
     error.in_read_wind(wind_mps[0].hypot(wind_mps[1]))

@@ -13,9 +13,7 @@ use super::super::gls::Start;
 use super::super::refine::{self, Parameter, slopes};
 use super::super::search::FLOOR_NATS;
 use super::super::verdict::is_strong_wind;
-use super::in_updraft::{
-    InUpdraft, NEAR, UPDRAFT_ROUNDS, UPDRAFT_STEP_MPS, UPDRAFTS_MPS, likely_if,
-};
+use super::in_updraft::{InUpdraft, NEAR, UPDRAFT_ROUNDS, UPDRAFTS_MPS, likely_if};
 use super::{Found, Look, Search};
 use crate::effects::Role;
 use crate::vehicle::Vehicle;
@@ -276,10 +274,8 @@ fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
         let there = flown.clone().in_updraft(updraft_mps);
         // The noise is what the model leaves, which changes less than the updraft.
         let here = if round == 0 { fits(found, &there)? } else { fits_size(found, &there)? };
-        let step_mps = here.most_mps - updraft_mps;
         let before_mps = updraft_mps;
-        updraft_mps = (updraft_mps + step_mps.clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS))
-            .clamp(flown_mps - REACH_MPS, flown_mps + REACH_MPS);
+        updraft_mps = here.most_mps.clamp(flown_mps - REACH_MPS, flown_mps + REACH_MPS);
         if (updraft_mps - before_mps).abs() < SETTLED_MPS {
             break;
         }

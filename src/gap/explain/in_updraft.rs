@@ -625,7 +625,7 @@ const FLOWN_ROUNDS: usize = 2;
 /// Rounds in which the updraft settles, at most. Numerical.
 pub(super) const UPDRAFT_ROUNDS: usize = 6;
 /// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
-pub(super) const UPDRAFT_STEP_MPS: f64 = 1.0;
+const UPDRAFT_STEP_MPS: f64 = 1.0;
 /// By how much less likely a flight may become where its updraft is flown, nats: what the drones' answers to gusts
 /// make of it there. Chosen, three times [`super::WORSE_NATS`].
 const SAME_NATS: f64 = 6.0;
