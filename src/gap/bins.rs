@@ -102,7 +102,7 @@ pub struct BinValues {
     pub climb_mps: f64,
     /// Mean height above home, m.
     pub height_m: f64,
-    /// Mean lean of the thrust axis, show frame x and y, rad.
+    /// Mean lean: the horizontal part of the thrust axis (the sine of the lean), show frame x and y, rad where it is small.
     pub lean_rad: [f64; 2],
     /// Battery voltage at rest, V; NaN if it was not logged.
     pub resting_v: f64,

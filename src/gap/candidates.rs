@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use super::compare::Comparison;
 use super::decide::CLASS_NATS;
 use super::gls::{Column, Solution};
-use super::lean::GRAVITY;
+use super::lean_law::GRAVITY;
 use super::noise::{GroupPattern, Hyper};
 use super::pack;
 use super::response::{self, Response};

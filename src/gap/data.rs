@@ -619,8 +619,8 @@ mod tests {
         assert_eq!(slots(&data), [1, 2, 3, 4]);
         assert_eq!(
             data.left_out,
-            ["slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, or another \
-              flight)"]
+            ["slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, carried \
+              away by the wind, or another flight)"]
             .map(|text| LeftOut::from(text.to_owned()))
         );
         pulses[4] = [0; 10];

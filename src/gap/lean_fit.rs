@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bins::Bin;
 use super::gusts::{Gusts, Seen};
-use super::lean::LeanLaw;
+use super::lean_law::LeanLaw;
 use super::memory::{Digest, Memory};
 use crate::numeric::mean;
 use crate::numeric::{differences_at_once, minimise, minimise_roughly};

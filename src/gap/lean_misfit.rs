@@ -2,10 +2,10 @@
 //! more leans less: how much drones lean in climbs and descents tells a drag that is missing, and the updraft, apart from
 //! whatever the pulses tell.
 
-use super::lean::LeanLaw;
 use super::lean_fit::{
     GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, bottom, hovering_wind, usable,
 };
+use super::lean_law::LeanLaw;
 use crate::numeric::{differences_at_once, most};
 
 /// Standard deviation of the linear part of a model's law: as a share, as bodies may differ from the model by some tenths,

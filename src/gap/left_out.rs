@@ -57,7 +57,7 @@ impl fmt::Display for LeftOut {
             Self::FewBins { slot, usable, bins } => write!(
                 f,
                 "slot {slot}: only {usable} of {bins} steady bins are usable (gaps in the log, motors at \
-                 a limit, or another flight)"
+                 a limit, carried away by the wind, or another flight)"
             ),
             Self::OtherFlight { slot } => {
                 write!(f, "slot {slot}: its log is of another flight than nearly all others")

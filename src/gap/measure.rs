@@ -8,7 +8,9 @@ const FEWEST_SAMPLES: usize = 5;
 /// A silence longer than this breaks a bin, s. As in the analysis; chosen.
 const GAP_S: f64 = 1.0;
 /// A bin is left out when its mean velocity is further than this from the command, m/s: a drone at its
-/// limits falls behind (AirSim's quad by 0.45 m/s at 7 m/s through the air). Chosen below that.
+/// limits falls behind (AirSim's quad by 0.45 m/s at 7 m/s through the air; ArduPilot's own frame, which leans by 30 degrees
+/// at most, by 1.2 m/s on a leg of 3 m/s against 8 m/s of wind, where it is off by less than 0.2 m/s on all legs that it can fly).
+/// Chosen below that.
 const FOLLOW_MPS: f64 = 0.3;
 /// Quantum of a logged pulse, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
@@ -45,6 +47,13 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
     if !follows(climb_mps) && !rise_mps(flight, bin).is_some_and(follows) {
         return None;
     }
+    // Who leans as far as its autopilot lets it is carried away by the wind, and its lean is no longer that of the plan.
+    let [x_mps, y_mps, _] = bin.velocity_mps;
+    if moved_mps(flight, bin, turn).is_some_and(|[moved_x_mps, moved_y_mps]| {
+        (moved_x_mps - x_mps).hypot(moved_y_mps - y_mps) > FOLLOW_MPS
+    }) {
+        return None;
+    }
     let lean_rad = lean(flight, start_s, end_s, turn)?;
     let pulse = mean(pulses)?;
     let zero = flight.effort.indicator.without_thrust();
@@ -78,6 +87,19 @@ fn rise_mps(flight: &Flight, bin: &Bin) -> Option<f64> {
     Some((height(bin.end_s)? - height(bin.start_s)?) / bin.length_s())
 }
 
+/// Horizontal velocity over a bin by the places at its ends, show frame, m/s.
+fn moved_mps(flight: &Flight, bin: &Bin, turn: (f64, f64)) -> Option<[f64; 2]> {
+    let over = |series: &Series| {
+        Some((series.at(bin.end_s, GAP_S)? - series.at(bin.start_s, GAP_S)?) / bin.length_s())
+    };
+    Some(in_show_frame(over(&flight.north_m)?, over(&flight.east_m)?, turn))
+}
+
+/// Along the show's axes: x is `orientation` clockwise from north, with this sine and cosine, and y to the left of it.
+fn in_show_frame(north: f64, east: f64, (sin, cos): (f64, f64)) -> [f64; 2] {
+    [cos * north + sin * east, sin * north - cos * east]
+}
+
 fn is_saturated(flight: &Flight, start_s: f64, end_s: f64) -> bool {
     let (low, high) = flight.pulse_limits_us;
     let share = |values: &[f64], at: &dyn Fn(f64) -> bool| {
@@ -91,7 +113,7 @@ fn is_saturated(flight: &Flight, start_s: f64, end_s: f64) -> bool {
 }
 
 /// Mean horizontal part of the thrust axis, show frame.
-fn lean(flight: &Flight, start_s: f64, end_s: f64, (sin, cos): (f64, f64)) -> Option<[f64; 2]> {
+fn lean(flight: &Flight, start_s: f64, end_s: f64, turn: (f64, f64)) -> Option<[f64; 2]> {
     let times = flight.roll_rad.times_between(start_s, end_s);
     let rolls = flight.roll_rad.between(start_s, end_s);
     let (mut north, mut east, mut count) = (0.0, 0.0, 0.0);
@@ -113,8 +135,7 @@ fn lean(flight: &Flight, start_s: f64, end_s: f64, (sin, cos): (f64, f64)) -> Op
     // Accelerating takes lean as well; what is left is the wind's.
     let (north_mps2, east_mps2) = acceleration(flight, start_s, end_s).unwrap_or_default();
     let (north, east) = (north - north_mps2 / GRAVITY, east - east_mps2 / GRAVITY);
-    // Show x is `orientation` clockwise from north, show y to the left of it.
-    Some([cos * north + sin * east, sin * north - cos * east])
+    Some(in_show_frame(north, east, turn))
 }
 
 /// Mean horizontal acceleration over a bin by the speeds at its ends, north and east, m/s².
@@ -136,4 +157,56 @@ const GRAVITY: f64 = 9.80665;
 /// Mean of logged values; `None` of nothing, and if a value is not finite.
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
     crate::numeric::mean(values).filter(|mean| mean.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Effort;
+
+    /// A log of ten seconds at these speeds, north, east and up, m/s.
+    fn log([north_mps, east_mps, up_mps]: [f64; 3]) -> Flight {
+        let time_s: Vec<f64> = (0..100).map(|tenth| 0.1 * f64::from(tenth)).collect();
+        let series = |of: &dyn Fn(f64) -> f64| Series {
+            time_s: time_s.clone(),
+            value: time_s.iter().map(|time_s| of(*time_s)).collect(),
+        };
+        Flight {
+            velocity_up_mps: series(&|_| up_mps),
+            height_m: series(&|time_s| 20.0 + up_mps * time_s),
+            north_m: series(&|time_s| north_mps * time_s),
+            east_m: series(&|time_s| east_mps * time_s),
+            effort: Effort { values: series(&|_| 1500.0), ..Effort::default() },
+            roll_rad: series(&|_| 0.1),
+            pitch_rad: series(&|_| 0.0),
+            yaw_deg: series(&|_| 0.0),
+            pulse_limits_us: (1000.0, 2000.0),
+            ..Flight::default()
+        }
+    }
+
+    #[test]
+    fn a_drone_that_the_wind_carries_away_is_not_measured() {
+        // Show x is east.
+        let turn = 90.0_f64.to_radians().sin_cos();
+        let bin = |velocity_mps: [f64; 3]| Bin {
+            start_s: 3.0,
+            end_s: 6.0,
+            velocity_mps,
+            ..crate::gap::trial::ladder()[0].clone()
+        };
+        let measures = |told_mps: [f64; 3], flown_mps: [f64; 3]| {
+            one(&log(flown_mps), &bin(told_mps), turn, 1.0).is_some()
+        };
+        assert!(measures([0.0; 3], [0.0; 3]));
+        assert!(measures([0.0; 3], [0.2, 0.2, 0.0]), "it sways in gusts");
+        assert!(!measures([0.0; 3], [0.25, 0.25, 0.0]));
+        assert!(measures([-3.0, 0.0, 0.0], [0.0, -2.9, 0.0]));
+        assert!(!measures([-3.0, 0.0, 0.0], [0.0, -1.8, 0.0]), "a leg against the wind");
+        assert!(!measures([0.0, 3.0, 0.0], [-3.0, 0.0, 0.0]), "y is left of x: north");
+        assert!(measures([0.0, 3.0, 0.0], [3.0, 0.0, 0.0]));
+        let mut of_a_table = log([1.0, 1.0, 2.0]);
+        (of_a_table.north_m, of_a_table.east_m) = Default::default();
+        assert!(one(&of_a_table, &bin([0.0, 0.0, 2.0]), turn, 1.0).is_some(), "it has no place");
+    }
 }

@@ -28,6 +28,7 @@ mod kept;
 mod lean;
 mod lean_channel;
 mod lean_fit;
+mod lean_law;
 mod lean_misfit;
 pub mod left_out;
 mod make;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::bins::of_segments;
 use super::data::{Data, Flown};
 use super::explain::Found;
 use super::make::Input;
@@ -89,6 +90,8 @@ pub enum Warning {
     WindByLean {
         /// Speed of the mean wind, m/s.
         wind_mps: f64,
+        /// Whether the plan has horizontal legs, which the drones did not fly.
+        has_lost_legs: bool,
     },
     /// None of the drones of a group gave a usable log.
     GroupLost {
@@ -200,12 +203,18 @@ impl fmt::Display for Warning {
                 "all drones climb at the same time: what depends on climb speed is mixed with the \
                  shared air (calibration-counterphase tells them apart)",
             ),
-            Self::WindByLean { wind_mps } => write!(
-                f,
-                "no horizontal leg tells the wind: {wind_mps:.1} m/s are read from how the drones lean, by the model's \
-                 own drag, and drag of the body or the rotors that the model lacks would look like that \
-                 (calibration-counterphase has legs)"
-            ),
+            Self::WindByLean { wind_mps, has_lost_legs } => {
+                write!(
+                    f,
+                    "no horizontal leg tells the wind: {wind_mps:.1} m/s are read from how the drones lean, by the \
+                     model's own drag, and drag of the body or the rotors that the model lacks would look like that "
+                )?;
+                f.write_str(if *has_lost_legs {
+                    "(the plan has legs, but the drones could not fly them in this air: fly in less wind)"
+                } else {
+                    "(calibration-counterphase has legs)"
+                })
+            }
             Self::GroupLost { group, planned, left } => {
                 write!(
                     f,
@@ -297,13 +306,20 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         let wind_mps = wind.mean_mps[0].hypot(wind.mean_mps[1]);
         let is_by_lean = wind.measured.is_none() && wind.mean_se_mps > 0.0;
         if is_by_lean && input.simulated.is_none() && wind_mps >= WINDY_MPS {
-            warnings.push(Warning::WindByLean { wind_mps });
+            let has_lost_legs = !data.has_legs() && has_legs(plan);
+            warnings.push(Warning::WindByLean { wind_mps, has_lost_legs });
         }
     }
     if found.comparison.scene.volts.is_none() {
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// Whether anything is to be flown over ground.
+fn has_legs(plan: &Plan) -> bool {
+    let bins = plan.groups.iter().flat_map(|group| of_segments(&group.segments));
+    bins.into_iter().any(|bin| bin.is_horizontal())
 }
 
 /// Name of the effect that a thrust curve is.
@@ -336,6 +352,15 @@ fn groups_lost(plan: &Plan, data: &Data) -> Vec<Warning> {
 mod tests {
     use super::*;
     use crate::gap::verdict::{Shrink, Verdict, WindFound};
+
+    #[test]
+    fn legs_that_were_planned_and_not_flown_are_said() {
+        let said =
+            |has_lost_legs: bool| Warning::WindByLean { wind_mps: 9.2, has_lost_legs }.to_string();
+        assert!(said(false).starts_with("no horizontal leg tells the wind: 9.2 m/s are read"));
+        assert!(said(false).ends_with("(calibration-counterphase has legs)"), "{}", said(false));
+        assert!(said(true).ends_with("could not fly them in this air: fly in less wind)"));
+    }
 
     #[test]
     fn much_that_nothing_explains_is_said() {

@@ -286,7 +286,8 @@ fn settles(found: &mut Found, flown: &Comparison) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::super::compare::Simulated;
-    use super::super::super::lean::{LeanLaw, Measured};
+    use super::super::super::lean::Measured;
+    use super::super::super::lean_law::LeanLaw;
     use super::super::super::model_flights::ModelFlights;
     use super::super::super::trial;
     use super::super::Options;
