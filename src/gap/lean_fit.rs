@@ -308,8 +308,7 @@ impl InAir {
     ) -> [Seen<N>; 2] {
         let [vx, vy, climb_mps] = point.velocity_mps;
         let air = [vx - self.mean_mps[0], vy - self.mean_mps[1]];
-        let wanted = self.law.lean(air, climb_mps);
-        let slopes = self.law.slopes(air, climb_mps);
+        let (wanted, slopes) = self.law.lean_and_slopes(air, climb_mps);
         let scatter =
             if point.moves { self.scatter_rad.hypot(UNSETTLED_RAD) } else { self.scatter_rad };
         let more_mps = self.mean_mps.map(|mean_mps| mean_mps * aloft);

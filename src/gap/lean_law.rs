@@ -24,7 +24,7 @@ const TRIM_TURNS_DEG: [f64; 3] = [0.0, 22.5, 45.0];
 const TRIM_CLIMBS_MPS: [f64; 5] = [-3.5, -1.5, 0.0, 1.5, 3.5];
 /// Farthest lean that is looked for, sine: beyond 64 degrees no autopilot flies.
 const MOST_LEAN: f64 = 0.9;
-/// Steps of Newton's method to a lean, at most: four are usual. Numerical.
+/// Steps to a lean, at most: five are usual. Numerical.
 const STEPS: usize = 20;
 /// A step to a lean that is shorter is the last. Numerical.
 const LAST_STEP: f64 = 1e-10;
@@ -90,7 +90,7 @@ struct Body {
 impl Body {
     fn of(lean: Vector2<f64>) -> Self {
         let cos = cos_of(lean);
-        Self { lean, cos, nose: cos.hypot(lean.x) }
+        Self { lean, cos, nose: (cos * cos + lean.x * lean.x).sqrt() }
     }
 
     /// The part of the weight along the nose, and to the left of it, as a share.
@@ -233,7 +233,7 @@ impl LeanLaw {
     pub(super) fn lean(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
         let axial_mps = climb_mps - self.updraft_mps;
         if let Some(leaning) = self.leaning {
-            return self.leaning_lean(leaning, (air_mps.into(), axial_mps)).into();
+            return self.balanced(leaning, (air_mps.into(), axial_mps)).into();
         }
         let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
         let whole_mps = (square_mps2 + axial_mps * axial_mps).sqrt();
@@ -250,38 +250,37 @@ impl LeanLaw {
     ) -> Vector2<f64> {
         let body = Body::of(lean);
         let (across_mps, axial_mps) = body.air(air_mps, climb_mps);
-        let whole_mps = across_mps.norm().hypot(axial_mps);
-        let rotors = self.linear * leaning.share(axial_mps, body.cos);
-        let linear = rotors + self.body_square() * whole_mps;
+        let mut linear = self.linear * leaning.share(axial_mps, body.cos);
+        if self.body_share != 0.0 {
+            let whole_mps = (across_mps.norm_squared() + axial_mps * axial_mps).sqrt();
+            linear += self.body_square() * whole_mps;
+        }
         across_mps.map(|part| (linear + self.box_square() * part.abs()) * part) - body.weight()
     }
 
-    /// Where they are in balance.
-    fn leaning_lean(self, leaning: Leaning, air: (Vector2<f64>, f64)) -> Vector2<f64> {
+    /// Where they are in balance, by Broyden's method: each step costs one more look.
+    fn balanced(self, leaning: Leaning, air: (Vector2<f64>, f64)) -> Vector2<f64> {
+        let left_over = |lean: Vector2<f64>| self.left_over(leaning, air, lean);
         let within = |lean: Vector2<f64>| lean.cap_magnitude(MOST_LEAN);
-        let level = self.left_over(leaning, air, Vector2::zeros());
+        let level = left_over(Vector2::zeros());
         let mut lean = within(level / (1.0 + level.norm_squared()).sqrt());
+        let mut off = left_over(lean);
+        let Some(mut inverse) = differences(lean, off, left_over).try_inverse() else {
+            return lean;
+        };
         for _ in 0..STEPS {
-            let off = self.left_over(leaning, air, lean);
-            let Some(inverse) = self.by_lean(leaning, air, lean).try_inverse() else { break };
             let next = within(lean - inverse * off);
-            let step = (next - lean).norm();
-            lean = next;
-            if step < LAST_STEP {
+            let moved = next - lean;
+            let next_off = left_over(next);
+            let reached = inverse * (next_off - off);
+            (lean, off) = (next, next_off);
+            let along = moved.dot(&reached);
+            if moved.norm_squared() < LAST_STEP * LAST_STEP || along == 0.0 {
                 break;
             }
+            inverse += (moved - reached) * (moved.transpose() * inverse) / along;
         }
         lean
-    }
-
-    /// Change of what is left over with the lean.
-    fn by_lean(
-        self,
-        leaning: Leaning,
-        air: (Vector2<f64>, f64),
-        lean: Vector2<f64>,
-    ) -> Matrix2<f64> {
-        differences(lean, |lean| self.left_over(leaning, air, lean))
     }
 
     /// Change of the lean with the air at a horizontal air speed, rad/(m/s).
@@ -289,33 +288,42 @@ impl LeanLaw {
         self.linear + 2.0 * self.square * speed_mps
     }
 
-    /// Change of each axis' lean with each axis' air, rad/(m/s).
-    pub(super) fn slopes(self, air_mps: [f64; 2], climb_mps: f64) -> Matrix2<f64> {
+    /// The lean in horizontal air, show frame, and the change of each axis' lean with each axis' air, rad/(m/s).
+    pub(super) fn lean_and_slopes(
+        self,
+        air_mps: [f64; 2],
+        climb_mps: f64,
+    ) -> ([f64; 2], Matrix2<f64>) {
         let axial_mps = climb_mps - self.updraft_mps;
         if let Some(leaning) = self.leaning {
-            return self.leaning_slopes(leaning, (air_mps.into(), axial_mps));
+            let (lean, slopes) = self.balance_and_slopes(leaning, (air_mps.into(), axial_mps));
+            return (lean.into(), slopes);
         }
         let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
         let whole_mps = (square_mps2 + axial_mps * axial_mps).sqrt().max(1e-6);
         let body = self.body_square();
-        Matrix2::from_fn(|row, column| {
+        let slopes = Matrix2::from_fn(|row, column| {
             let turned = body / whole_mps * air_mps[row] * air_mps[column];
             let both = self.linear + body * whole_mps;
             let own = both + 2.0 * self.box_square() * air_mps[row].abs();
             turned + if row == column { own } else { 0.0 }
-        })
+        });
+        (self.lean(air_mps, climb_mps), slopes)
     }
 
-    fn leaning_slopes(
+    fn balance_and_slopes(
         self,
         leaning: Leaning,
         (air_mps, climb_mps): (Vector2<f64>, f64),
-    ) -> Matrix2<f64> {
-        let lean = self.leaning_lean(leaning, (air_mps, climb_mps));
-        let by_air =
-            differences(air_mps, |air_mps| self.left_over(leaning, (air_mps, climb_mps), lean));
-        let inverse = self.by_lean(leaning, (air_mps, climb_mps), lean).try_inverse();
-        inverse.map_or(by_air, |inverse| -inverse * by_air)
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        let lean = self.balanced(leaning, (air_mps, climb_mps));
+        let off = self.left_over(leaning, (air_mps, climb_mps), lean);
+        let by_air = differences(air_mps, off, |air_mps| {
+            self.left_over(leaning, (air_mps, climb_mps), lean)
+        });
+        let by_lean =
+            differences(lean, off, |lean| self.left_over(leaning, (air_mps, climb_mps), lean));
+        (lean, by_lean.try_inverse().map_or(by_air, |inverse| -inverse * by_air))
     }
 
     /// Horizontal air over ground-fixed axes by the lean of the thrust axis, m/s.
@@ -379,9 +387,12 @@ impl LeanLaw {
     }
 }
 
-/// Derivatives of two numbers by two.
-fn differences(at: Vector2<f64>, of: impl Fn(Vector2<f64>) -> Vector2<f64>) -> Matrix2<f64> {
-    let here = of(at);
+/// Derivatives of two numbers by two, which are `here` at a place.
+fn differences(
+    at: Vector2<f64>,
+    here: Vector2<f64>,
+    of: impl Fn(Vector2<f64>) -> Vector2<f64>,
+) -> Matrix2<f64> {
     let by = |axis: Vector2<f64>| (of(at + axis * STEP) - here) / STEP;
     Matrix2::from_columns(&[by(Vector2::x()), by(Vector2::y())])
 }
@@ -460,7 +471,7 @@ mod tests {
         for law in [sitl, sitl.with_body(0.002), pixel.with_body(0.002)] {
             for air_mps in [[5.0, -3.0], [-9.0, 1.0], [0.2, 0.1]] {
                 for climb_mps in [-3.0, 2.0] {
-                    let slopes = law.slopes(air_mps, climb_mps);
+                    let (_, slopes) = law.lean_and_slopes(air_mps, climb_mps);
                     for axis in 0..2 {
                         let at = |by_mps: f64| {
                             let mut there_mps = air_mps;
