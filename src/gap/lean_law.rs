@@ -62,7 +62,7 @@ pub struct Leaning {
     pub axial: f64,
     /// Quadratic part (q), 1/(m/s)².
     pub axial_square: f64,
-    /// What of the weight the axis does not carry takes away (r).
+    /// Part that a lean takes away, whose axis no longer carries all of the weight (r), per versine of the lean.
     pub versine: f64,
 }
 
