@@ -83,7 +83,7 @@ fn cos_of(lean: Vector2<f64>) -> f64 {
 struct Body {
     lean: Vector2<f64>,
     cos: f64,
-    /// Cosine of the angle by which its nose is off level, over that of its lean.
+    /// Cosine of its lean over that of the angle by which its nose is off level.
     nose: f64,
 }
 
