@@ -117,6 +117,8 @@ pub struct Data {
     pub left_out: Vec<LeftOut>,
     /// Resistance of the batteries, ohm, if the logs have it: median of what the autopilots found.
     pub resistance_ohm: Option<f64>,
+    /// Direction of the x axis in which bins have their velocities, degrees clockwise from north: the plan's; 0 without a plan.
+    pub orientation_deg: f64,
 }
 
 impl Data {
@@ -132,7 +134,8 @@ impl Data {
 
     /// Drones in steady bins of the plan's groups.
     pub fn of_plan(plan: &Plan, flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
-        let mut data = Self::default();
+        let orientation_deg = plan.site.orientation_deg;
+        let mut data = Self { orientation_deg, ..Self::default() };
         for (index, group) in plan.groups.iter().enumerate() {
             let bins = of_segments(&group.segments);
             let of_group = |slot: &Slot| usize::from(slot.group) == index;
@@ -141,12 +144,11 @@ impl Data {
                 .filter_map(|one| Some((plan.slot(one.slot)?, one.flight)))
                 .filter(|(slot, _)| of_group(slot))
                 .collect();
-            let orientation = plan.site.orientation_deg;
             let values: Vec<(u16, [f64; 2], Vec<Option<BinValues>>)> = drones
                 .iter()
                 .map(|(slot, flight)| {
                     let place = [slot.home_m[0], slot.home_m[1]];
-                    let values = measured(flight, &bins, orientation, thrust_exponent);
+                    let values = measured(flight, &bins, orientation_deg, thrust_exponent);
                     (slot.slot, place, values)
                 })
                 .collect();
@@ -220,7 +222,9 @@ impl Data {
         thrust_exponent: f64,
     ) -> Vec<Vec<Option<BinValues>>> {
         let of_drone = |one: &Flown<'_>| -> Vec<Vec<Option<BinValues>>> {
-            let own = |group: &Group| measured(one.flight, &group.bins, 0.0, thrust_exponent);
+            let own = |group: &Group| {
+                measured(one.flight, &group.bins, self.orientation_deg, thrust_exponent)
+            };
             self.groups.iter().map(own).collect()
         };
         let drones: Vec<Vec<Vec<Option<BinValues>>>> = flown.iter().map(of_drone).collect();
@@ -369,6 +373,7 @@ impl Data {
                 .collect(),
             left_out: self.left_out.clone(),
             resistance_ohm: self.resistance_ohm,
+            orientation_deg: self.orientation_deg,
         };
         (part(false), part(true))
     }

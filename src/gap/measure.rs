@@ -83,16 +83,17 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
 
 /// Rate of the height over a bin, m/s.
 fn rise_mps(flight: &Flight, bin: &Bin) -> Option<f64> {
-    let height = |time_s: f64| flight.height_m.at(time_s, GAP_S);
-    Some((height(bin.end_s)? - height(bin.start_s)?) / bin.length_s())
+    rate(&flight.height_m, bin)
 }
 
 /// Horizontal velocity over a bin by the places at its ends, show frame, m/s.
 fn moved_mps(flight: &Flight, bin: &Bin, turn: (f64, f64)) -> Option<[f64; 2]> {
-    let over = |series: &Series| {
-        Some((series.at(bin.end_s, GAP_S)? - series.at(bin.start_s, GAP_S)?) / bin.length_s())
-    };
-    Some(in_show_frame(over(&flight.north_m)?, over(&flight.east_m)?, turn))
+    Some(in_show_frame(rate(&flight.north_m, bin)?, rate(&flight.east_m, bin)?, turn))
+}
+
+/// Rate of a series between the ends of a bin, per second.
+fn rate(of: &Series, bin: &Bin) -> Option<f64> {
+    Some((of.at(bin.end_s, GAP_S)? - of.at(bin.start_s, GAP_S)?) / bin.length_s())
 }
 
 /// Along the show's axes: x is `orientation` clockwise from north, with this sine and cosine, and y to the left of it.
@@ -208,5 +209,22 @@ mod tests {
         let mut of_a_table = log([1.0, 1.0, 2.0]);
         (of_a_table.north_m, of_a_table.east_m) = Default::default();
         assert!(one(&of_a_table, &bin([0.0, 0.0, 2.0]), turn, 1.0).is_some(), "it has no place");
+    }
+
+    #[test]
+    fn legs_of_simulated_logs_are_those_of_a_plan_that_is_turned() {
+        let mut data = crate::gap::trial::data(1, |_, _| 0.0);
+        let group = &mut data.groups[0];
+        group.bins.truncate(1);
+        group.measured.iter_mut().for_each(|drone| drone.truncate(1));
+        let (start_s, end_s, velocity_mps) = (3.0, 6.0, [3.0, 0.0, 0.0]);
+        group.bins[0] = Bin { start_s, end_s, velocity_mps, ..group.bins[0].clone() };
+        group.measured[0][0].height_m = 20.0;
+        let flight = log([0.0, 3.0, 0.0]);
+        let flown = [crate::gap::Flown { slot: 1, flight: &flight }];
+        let has_leg = |data: &crate::gap::Data| data.averaged(&flown, 1.0)[0][0].is_some();
+        assert!(!has_leg(&data), "it flew east for north");
+        data.orientation_deg = 90.0;
+        assert!(has_leg(&data), "the plan's x is east");
     }
 }
