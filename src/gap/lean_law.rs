@@ -157,8 +157,10 @@ impl LeanLaw {
         if fastest < FEWEST_SPEEDS {
             return None;
         }
-        // The other frame's drag acts along the body's axes.
-        let columns = if vehicle.airframe.sitl.is_some() { 5 } else { 6 };
+        // The other frame's own drag acts along the body's axes; only a body in one piece feels the whole air.
+        let is_box = vehicle.airframe.sitl.is_some()
+            && Role::BodyDragSide.value(vehicle).is_none_or(|side| side == 0.0);
+        let columns = if is_box { 5 } else { 6 };
         let (mut parts, mut weights) = (Vec::new(), Vec::new());
         for speed_mps in TRIM_SPEEDS_MPS {
             for turn_deg in TRIM_TURNS_DEG {
@@ -435,6 +437,17 @@ mod tests {
         Role::MomentumDrag.set(&mut vehicle, 0.3);
         let (lean, air_mps) = most_off(&vehicle, &[1.0, 3.0, 6.0, 8.0], &climbs_mps);
         assert!(lean < 0.0025 && air_mps < 0.04, "{lean}, {air_mps} m/s");
+    }
+
+    #[test]
+    fn a_round_body_on_the_firmwares_own_vehicle_leans_by_its_trim() {
+        for size in [0.01, 0.03] {
+            let mut vehicle = builtin("arducopter-sitl").unwrap();
+            Role::BodyDragTop.set(&mut vehicle, size);
+            Role::BodyDragSide.set(&mut vehicle, size);
+            let (lean, air_mps) = most_off(&vehicle, &[1.0, 3.0, 6.0], &[-3.5, -1.0, 0.0, 3.5]);
+            assert!(lean < 0.001 && air_mps < 0.02, "{size}: {lean}, {air_mps} m/s");
+        }
     }
 
     #[test]
