@@ -30,6 +30,8 @@ const HINT_Z: f64 = 3.0;
 
 /// Air speed of a leg, m/s: those of the templates.
 const LEG_MPS: f64 = 3.0;
+/// Fastest air of a leg that tells a body, m/s: against a wind that is as fast.
+const FASTEST_LEG_MPS: f64 = 2.0 * LEG_MPS;
 /// Strongest updraft that a flight may be in as a whole, m/s: thermals that a fleet can fly a calibration in.
 const MOST_UPDRAFT_MPS: f64 = 2.0;
 
@@ -72,12 +74,12 @@ fn apart(measured: LeanLaw, model: f64) -> f64 {
     (least - model).max(0.0) + (most - model).min(0.0)
 }
 
-/// An interval of a size that the leans told, widened by what the updraft of the flight may make of it.
+/// An interval of a size that the leans told, widened by what the updraft of the flight and the form of its drag may make of it.
 fn widened(of: Interval, measured: LeanLaw) -> Interval {
     let (least, most) = in_updrafts(measured);
-    let (below, above) = (measured.linear - least, most - measured.linear);
-    let low = of.value - (of.value - of.low).hypot(below);
-    Interval { low, high: of.value + (of.high - of.value).hypot(above), ..of }
+    let with_form = |half: f64, by_updraft: f64| half.hypot(HALF * FORM).hypot(by_updraft);
+    let low = of.value - with_form(of.value - of.low, measured.linear - least);
+    Interval { low, high: of.value + with_form(of.high - of.value, most - measured.linear), ..of }
 }
 
 /// Effects that lean a drone alike at every speed over ground: rotors that flap, and air that gives up its momentum
@@ -190,7 +192,7 @@ fn bodies() -> Vec<String> {
 /// The drag areas, m², of a body that leans the vehicle by so much more than its own does, where each of its sides leans it by so
 /// much, rad/(m/s)²: a round one, or the vehicle's own, as much larger from above as from the side.
 fn of_body((body, per_m2): (Body, f64), vehicle: &Vehicle) -> Option<Vec<Fitted>> {
-    let half = HALF * body.square_se;
+    let half = HALF * body.square_se.hypot(FORM / FASTEST_LEG_MPS);
     (per_m2 > 0.0 && half.is_finite()).then_some(())?;
     let sides_m2 = Role::BodyDragSide.value(vehicle).filter(|area| *area > 0.0);
     let one = |role: Role| {
@@ -256,7 +258,8 @@ mod tests {
         let found = of_body((body, 0.05), &vehicle).unwrap();
         assert_eq!(found[0].value, found[1].value);
         let Interval { value, low, high } = found[0].value;
-        assert!((value - 0.04).abs() < 1e-12 && low == 0.0 && (high - 0.088).abs() < 1e-12);
+        let half = 2.0 * 0.0012_f64.hypot(FORM / FASTEST_LEG_MPS) / 0.05;
+        assert!((value - 0.04).abs() < 1e-12 && low == 0.0 && (high - 0.04 - half).abs() < 1e-12);
         assert!(of_body((Body { square_se: f64::INFINITY, ..body }, 0.05), &vehicle).is_none());
         // One that the model has is as much larger from above.
         Role::BodyDragTop.set(&mut vehicle, 0.03);
@@ -308,10 +311,10 @@ mod tests {
             let found = widened(of, LeanLaw { linear: 0.05, ..law });
             (round(found.low), round(found.value), round(found.high))
         };
-        let alike = (0.047, 0.05, 0.053);
+        let alike = (0.0464, 0.05, 0.0536);
         assert_eq!(ends("airsim-generic-quad"), alike, "who leans alike in all of them");
         // In air that sinks by 2 m/s the rotors carry more, and in air that rises less.
-        assert_eq!(ends("arducopter-sitl"), (0.0434, 0.05, 0.0562));
+        assert_eq!(ends("arducopter-sitl"), (0.0431, 0.05, 0.0565));
     }
 
     #[test]

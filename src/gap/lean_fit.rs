@@ -40,6 +40,10 @@ const GUST_S: f64 = 25.0;
 /// rough (Stull 1988, section 9.7). Legs and hovers are flown at several heights, and what the wind gains aloft must not
 /// be taken from the law.
 pub(super) const SHEAR: f64 = 0.2;
+/// Prior standard deviation of the updraft about the one that the law holds in, m/s. Leans of climbs and descents go with
+/// it where a body feels the whole air, and a wrong one must not be taken for a wind: on ArduPilot's own frame with twice its drag,
+/// 0.5 m/s of updraft that nobody knew of made 2.4 m/s of the wind out of 3.0, against what the legs said.
+const UPDRAFT_MPS: f64 = 2.0;
 /// Heights below this count as this, m: the roughness layer.
 const LOWEST_M: f64 = 1.0;
 /// Prior median of the scatter of a group's mean lean in a bin, rad: a tenth of a degree, what attitudes of
@@ -197,12 +201,12 @@ impl Leans {
     /// Minus the logarithm of their likelihood, without its constant: each lean is the law's in the mean wind, and gusts
     /// change it by the law's slopes there. (The other way round, from leans to the wind, a law without a linear part has
     /// no slope where a lean is small.) `sizes` are the standard deviations of the gusts along both axes, of the growth of
-    /// the wind with height, and of what else lasts; `more` is what the latter change a lean, rad, by. Of several laws at
-    /// once: each waits for its own last moment, and meanwhile the others go on.
+    /// the wind with height, and of what else lasts; `more` is what the latter change a lean, rad, by, which changes with the
+    /// climb by so much, rad/(m/s). Of several laws at once: each waits for its own last moment, and meanwhile the others go on.
     pub(super) fn misfits_nats<const N: usize, const LAWS: usize>(
         &self,
         of: &[(InAir, [f64; N]); LAWS],
-        more: impl Fn(&Point, f64) -> [f64; N],
+        more: impl Fn(&Point, f64, f64) -> [f64; N],
     ) -> [f64; LAWS] {
         let mut gusts = of.map(|(_, sizes)| Gusts::new(sizes));
         for (point, (decay, aloft)) in self.points.iter().zip(self.decay.iter().zip(&self.aloft)) {
@@ -304,7 +308,7 @@ impl InAir {
         &self,
         point: &Point,
         aloft: f64,
-        more: impl Fn(&Point, f64) -> [f64; N],
+        more: impl Fn(&Point, f64, f64) -> [f64; N],
     ) -> [Seen<N>; 2] {
         let [vx, vy, climb_mps] = point.velocity_mps;
         let air = [vx - self.mean_mps[0], vy - self.mean_mps[1]];
@@ -313,8 +317,8 @@ impl InAir {
             if point.moves { self.scatter_rad.hypot(UNSETTLED_RAD) } else { self.scatter_rad };
         let more_mps = self.mean_mps.map(|mean_mps| mean_mps * aloft);
         [0, 1].map(|axis| {
-            let by_air = [-slopes[(axis, 0)], -slopes[(axis, 1)]];
-            let mut looks_at = more(point, wanted[axis]);
+            let by_air = [-slopes.by_air[(axis, 0)], -slopes.by_air[(axis, 1)]];
+            let mut looks_at = more(point, wanted[axis], slopes.by_climb[axis]);
             let growth = by_air[0] * more_mps[0] + by_air[1] * more_mps[1];
             for (place, look) in [by_air[0], by_air[1], growth].into_iter().enumerate() {
                 looks_at[place] = look;
@@ -363,9 +367,14 @@ fn misfits<const SETS: usize>(
     lacks: Lacks,
 ) -> [f64; SETS] {
     let of = at.map(|at| Candidate::of(&at, model, lacks));
-    let airs =
-        of.each_ref().map(|Candidate { air, .. }| (*air, [air.gust_mps, air.gust_mps, SHEAR]));
-    let mut misfits = leans.misfits_nats(&airs, |_, _| [0.0; 3]);
+    let airs = of.each_ref().map(|of| of.air);
+    let mut misfits = if lacks == Lacks::Body || model.feels_updraft() {
+        let sizes = airs.map(|air| (air, [air.gust_mps, air.gust_mps, SHEAR, UPDRAFT_MPS]));
+        leans.misfits_nats(&sizes, |_, _, by_climb| [0.0, 0.0, 0.0, -by_climb])
+    } else {
+        let sizes = airs.map(|air| (air, [air.gust_mps, air.gust_mps, SHEAR]));
+        leans.misfits_nats(&sizes, |_, _, _| [0.0; 3])
+    };
     let square = |value: f64| value * value;
     for ((misfit, of), at) in misfits.iter_mut().zip(&of).zip(at) {
         let drag = match lacks {
@@ -458,6 +467,25 @@ mod tests {
             let off = found.law.linear - law().linear;
             assert!(off.abs() < 4e-4, "{shear}: {off} rad/(m/s)");
         }
+    }
+
+    #[test]
+    fn an_updraft_that_leans_of_climbs_show_is_not_taken_for_a_wind() {
+        let body = law().with_body(0.004);
+        let in_updraft = LeanLaw { updraft_mps: 1.0, ..body };
+        let mut flown = flown(body, 0.0);
+        // Every bin but the legs and a few hovers climbs or descends.
+        for (bin, point) in flown.iter_mut().enumerate().filter(|(_, point)| !point.moves) {
+            let climb_mps = [-3.0, -1.5, 0.0, 1.5, 3.0][bin % 5];
+            let air_mps = [5.0, -2.0];
+            let (before, after) = (body.lean(air_mps, 0.0), in_updraft.lean(air_mps, climb_mps));
+            point.velocity_mps[2] = climb_mps;
+            point.lean_rad = [0, 1].map(|axis| point.lean_rad[axis] + after[axis] - before[axis]);
+        }
+        let found = fit(flown, body);
+        let off_mps = (found.mean_mps[0] + 5.0).hypot(found.mean_mps[1] - 2.0);
+        let off = found.law.linear - body.linear;
+        assert!(off_mps < 0.15 && off.abs() < 0.001, "{off_mps} m/s, {off} rad/(m/s)");
     }
 
     #[test]

@@ -73,6 +73,15 @@ impl Leaning {
     }
 }
 
+/// How a lean changes with the air, rad/(m/s).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slopes {
+    /// Along each axis (row) with the horizontal air along each (column).
+    pub by_air: Matrix2<f64>,
+    /// Along each axis with the climb.
+    pub by_climb: [f64; 2],
+}
+
 /// The cosine of a lean.
 fn cos_of(lean: Vector2<f64>) -> f64 {
     (1.0 - lean.norm_squared()).max(1.0 - MOST_LEAN * MOST_LEAN).sqrt()
@@ -212,9 +221,13 @@ impl LeanLaw {
     /// Whether it reads the wind from leans as another law does: only a body in one piece, or axes that lean, take part in
     /// the updraft.
     pub(super) fn reads_as(self, other: Self) -> bool {
-        let feels_updraft = self.body_share != 0.0 || self.leaning.is_some();
-        let updraft_mps = if feels_updraft { self.updraft_mps } else { other.updraft_mps };
+        let updraft_mps = if self.feels_updraft() { self.updraft_mps } else { other.updraft_mps };
         Self { updraft_mps, ..self } == other
+    }
+
+    /// Whether a lean depends on the climb through the air.
+    pub(super) fn feels_updraft(self) -> bool {
+        self.body_share != 0.0 || self.leaning.is_some()
     }
 
     fn box_square(self) -> f64 {
@@ -290,12 +303,8 @@ impl LeanLaw {
         self.linear + 2.0 * self.square * speed_mps
     }
 
-    /// The lean in horizontal air, show frame, and the change of each axis' lean with each axis' air, rad/(m/s).
-    pub(super) fn lean_and_slopes(
-        self,
-        air_mps: [f64; 2],
-        climb_mps: f64,
-    ) -> ([f64; 2], Matrix2<f64>) {
+    /// The lean in horizontal air, show frame, and its changes with the air.
+    pub(super) fn lean_and_slopes(self, air_mps: [f64; 2], climb_mps: f64) -> ([f64; 2], Slopes) {
         let axial_mps = climb_mps - self.updraft_mps;
         if let Some(leaning) = self.leaning {
             let (lean, slopes) = self.balance_and_slopes(leaning, (air_mps.into(), axial_mps));
@@ -304,28 +313,32 @@ impl LeanLaw {
         let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
         let whole_mps = (square_mps2 + axial_mps * axial_mps).sqrt().max(1e-6);
         let body = self.body_square();
-        let slopes = Matrix2::from_fn(|row, column| {
+        let by_air = Matrix2::from_fn(|row, column| {
             let turned = body / whole_mps * air_mps[row] * air_mps[column];
             let both = self.linear + body * whole_mps;
             let own = both + 2.0 * self.box_square() * air_mps[row].abs();
             turned + if row == column { own } else { 0.0 }
         });
-        (self.lean(air_mps, climb_mps), slopes)
+        let by_climb = air_mps.map(|part| body * axial_mps / whole_mps * part);
+        (self.lean(air_mps, climb_mps), Slopes { by_air, by_climb })
     }
 
     fn balance_and_slopes(
         self,
         leaning: Leaning,
         (air_mps, climb_mps): (Vector2<f64>, f64),
-    ) -> (Vector2<f64>, Matrix2<f64>) {
+    ) -> (Vector2<f64>, Slopes) {
         let lean = self.balanced(leaning, (air_mps, climb_mps));
         let off = self.left_over(leaning, (air_mps, climb_mps), lean);
         let by_air = differences(air_mps, off, |air_mps| {
             self.left_over(leaning, (air_mps, climb_mps), lean)
         });
+        let higher = self.left_over(leaning, (air_mps, climb_mps + STEP), lean);
+        let by_climb = (higher - off) / STEP;
         let by_lean =
             differences(lean, off, |lean| self.left_over(leaning, (air_mps, climb_mps), lean));
-        (lean, by_lean.try_inverse().map_or(by_air, |inverse| -inverse * by_air))
+        let turned = by_lean.try_inverse().map_or_else(Matrix2::identity, |inverse| -inverse);
+        (lean, Slopes { by_air: turned * by_air, by_climb: (turned * by_climb).into() })
     }
 
     /// Horizontal air over ground-fixed axes by the lean of the thrust axis, m/s.
@@ -485,6 +498,12 @@ mod tests {
             for air_mps in [[5.0, -3.0], [-9.0, 1.0], [0.2, 0.1]] {
                 for climb_mps in [-3.0, 2.0] {
                     let (_, slopes) = law.lean_and_slopes(air_mps, climb_mps);
+                    let higher = law.lean(air_mps, climb_mps + 1e-4);
+                    let lower = law.lean(air_mps, climb_mps - 1e-4);
+                    for axis in 0..2 {
+                        let off = slopes.by_climb[axis] - (higher[axis] - lower[axis]) / 2e-4;
+                        assert!(off.abs() < 1e-6, "{law:?} {air_mps:?}: {slopes:?}");
+                    }
                     for axis in 0..2 {
                         let at = |by_mps: f64| {
                             let mut there_mps = air_mps;
@@ -494,8 +513,8 @@ mod tests {
                         let (up, down) = (at(1e-4), at(-1e-4));
                         for row in 0..2 {
                             let change = (up[row] - down[row]) / 2e-4;
-                            let off = slopes[(row, axis)] - change;
-                            assert!(off.abs() < 1e-6, "{law:?} {air_mps:?}: {slopes} {change}");
+                            let off = slopes.by_air[(row, axis)] - change;
+                            assert!(off.abs() < 1e-6, "{law:?} {air_mps:?}: {slopes:?} {change}");
                         }
                     }
                     let lean = law.lean(air_mps, climb_mps);

@@ -43,7 +43,7 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
         let air = InAir { mean_mps: [at[0], at[1]], law, gust_mps, scatter_rad };
         (air, [gust_mps, gust_mps, SHEAR, FORM_SHARE, FORM_SHARE])
     };
-    let of_form = |point: &Point, lean_rad: f64| {
+    let of_form = |point: &Point, lean_rad: f64, _: f64| {
         let along = point.velocity_mps[2] / fastest_mps;
         [0.0, 0.0, 0.0, lean_rad * along, lean_rad * (2.0 * along * along - 1.0)]
     };
