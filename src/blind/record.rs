@@ -9,7 +9,7 @@ use super::error::BlindError;
 use super::scenario::Scenario;
 use super::score::{Outcome, score};
 use super::seal::Opened;
-use super::told::{is_right, words};
+use super::told::{air_words, is_right, words};
 use crate::base::digest::sha256;
 use crate::campaign::to_json;
 use crate::gap::Verdict;
@@ -52,6 +52,9 @@ pub struct BlindRecord {
     pub right: bool,
     /// The comparison in plain words.
     pub words: Vec<String>,
+    /// Updraft and wind of the whole flight, and what the verdict says of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub air: Option<String>,
     /// The comparison.
     pub outcome: Outcome,
     /// SHA-256 of this file as it is with this text empty.
@@ -95,6 +98,7 @@ impl BlindRecord {
             truth: opened.truth.words(),
             right: is_right(&outcome),
             words: words(&outcome, verdict),
+            air: Some(air_words(&opened.truth, verdict)),
             outcome,
             sha256: String::new(),
         };
@@ -129,6 +133,7 @@ impl BlindRecord {
         let outcome = score(truth, verdict, &fisher_z);
         self.right == is_right(&outcome)
             && self.words == words(&outcome, verdict)
+            && self.air.as_ref().is_none_or(|air| *air == air_words(truth, verdict))
             && self.truth == truth.words()
             && self.verdict == verdict.summary
             && self.outcome == outcome

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hide::{KINDS, ON_REQUEST};
 use super::play::Played;
+use super::scenario::Scenario;
 use super::score::{Called, HiddenOutcome, Outcome};
 use crate::effects::{Role, find};
 use crate::gap::Verdict;
@@ -155,6 +156,11 @@ fn is_stated(effect: &str, size: f64, verdict: &Verdict) -> bool {
     })
 }
 
+/// Whether a verdict has found something that is in no library.
+fn says_unknown(verdict: &Verdict) -> bool {
+    verdict.steps.iter().any(|step| matches!(step.finding, Finding::Unknown { .. }))
+}
+
 fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
     let of_all = if Role::WarmUpTime.is_of(&one.effect) && one.value != 0.0 {
         " in the fleet's mean (motors that were warm at take-off drift no more)"
@@ -182,9 +188,13 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
         (None, ..) => String::new(),
     };
     match one.called {
-        Called::Named if one.foreign => format!(
+        Called::Named if one.foreign && says_unknown(verdict) => format!(
             "Right: {what} (it is in no library), and the verdict calls it unknown and says what it \
              depends on."
+        ),
+        Called::Named if one.foreign => format!(
+            "Right: {what} (it is in no library), and the verdict names {}, which does the same to first order.",
+            outcome.found.join(" and ")
         ),
         Called::Named => format!("Right: {what}, and the verdict names it.{sizes}"),
         Called::InClass => {
@@ -230,6 +240,20 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
             format!("Missed: {what}{z}, and the verdict {found}.{why}")
         }
     }
+}
+
+/// The updraft and the wind that a whole flight was in, and what its verdict says of them, in words.
+pub fn air_words(truth: &Scenario, verdict: &Verdict) -> String {
+    let noise = &verdict.noise;
+    let within = noise.updraft_half_mps.map_or_else(String::new, |half| format!(" ± {half:.2}"));
+    let speed_mps = |[x, y]: [f64; 2]| x.hypot(y);
+    format!(
+        "updraft {:.2} m/s, the verdict has {:.2}{within}; wind {:.1} m/s, the verdict reads {:.1}",
+        truth.updraft_mps(),
+        noise.updraft_mps,
+        speed_mps(truth.nuisance.air.wind_mps),
+        speed_mps(verdict.wind.mean_mps)
+    )
 }
 
 /// The held-out gap before and after, in words.

@@ -13,14 +13,7 @@ pub(super) fn formula(depends_on: Dependence, shape: &Shape) -> Option<String> {
     if x.len() < 5 {
         return None;
     }
-    let letter = match depends_on {
-        Dependence::Climb => "V",
-        Dependence::Height => "h",
-        Dependence::Time | Dependence::Step => "t",
-        Dependence::Wind => "v",
-        Dependence::Voltage => "q",
-        _ => return None,
-    };
+    let (letter, _) = symbol(depends_on)?;
     let mut forms: Vec<(String, f64)> = Vec::new();
     let linear = [x.clone()];
     if let Some((beta, share)) = explained(&linear, y) {
@@ -64,6 +57,18 @@ pub(super) fn formula(depends_on: Dependence, shape: &Shape) -> Option<String> {
     }
     let best = forms.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     (best.1 >= ENOUGH).then_some(best.0)
+}
+
+/// The letter by which formulas name what something depends on, and what that is in which unit; `None`: they have none for it.
+pub(super) fn symbol(depends_on: Dependence) -> Option<(&'static str, &'static str)> {
+    Some(match depends_on {
+        Dependence::Climb => ("V", "the climb through the air in m/s"),
+        Dependence::Height => ("h", "the height in m"),
+        Dependence::Time | Dependence::Step => ("t", "the time since arming in s"),
+        Dependence::Wind => ("v", "the horizontal air speed in m/s"),
+        Dependence::Voltage => ("q", "the charge as a share"),
+        _ => return None,
+    })
 }
 
 /// Coefficients of one or two regressors beside a constant, and the share of variance explained.

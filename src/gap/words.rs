@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use super::dependence::Dependence;
+use super::formula::symbol;
 use super::verdict::{Finding, Fitted, Form, Rest, Step, Verdict, is_strong_wind};
 use super::warning::{Warning, thrust_curve};
 use crate::effects::Role;
@@ -26,11 +27,21 @@ pub fn phrase(step: &Step) -> String {
             }
         ),
         Finding::Unknown { depends_on, formula } => {
-            let shape = formula.as_ref().map_or_else(String::new, |text| format!(", about {text}"));
+            let shape = formula.as_ref().map_or_else(String::new, |text| {
+                format!(", about {}", with_symbol(text, *depends_on))
+            });
             let quantity = quantity(*depends_on);
             format!("something that is not in the library and depends on {quantity}{shape}")
         }
     }
+}
+
+/// A formula with what its letter stands for.
+pub fn with_symbol(formula: &str, depends_on: Dependence) -> String {
+    symbol(depends_on).map_or_else(
+        || formula.to_owned(),
+        |(letter, meaning)| format!("{formula} ({letter}: {meaning})"),
+    )
 }
 
 /// A member of a class in words: effects by their names; motions of the air and what something unknown would

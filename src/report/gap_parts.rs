@@ -7,7 +7,7 @@ use crate::effects;
 use crate::gap::Dependence;
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Fitted, Shrink, Step};
-use crate::gap::words::{member, phrase, quantity};
+use crate::gap::words::{member, phrase, quantity, with_symbol};
 
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
@@ -112,7 +112,7 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
         gain => fixed(found.gain_nats, 1),
         threshold => fixed(found.threshold_nats, 1),
         chance => per_thousand(found.alpha),
-        size => fixed(found.size_us, 1),
+        size => (found.size_us > 0.0).then(|| fixed(found.size_us, 1)),
         in_field => found.in_field.as_ref().map(|size| micro(&in_field(size))),
         figure,
     }
@@ -150,10 +150,10 @@ fn what_it_means(finding: &Finding) -> String {
                 "The first one represents them in the model."
             }
         ),
-        Finding::Unknown { formula, .. } => {
-            let formula = formula
-                .as_ref()
-                .map_or_else(String::new, |text| format!(" It is about {}.", micro(text)));
+        Finding::Unknown { formula, depends_on } => {
+            let formula = formula.as_ref().map_or_else(String::new, |text| {
+                format!(" It is about {}.", micro(&with_symbol(text, *depends_on)))
+            });
             format!(
                 "No effect of the library explains this, but it is too regular for air and \
                  noise.{formula} It is not in the model file, because there is no effect to add."

@@ -118,12 +118,15 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
     page.say(
         "",
         &format!(
-            "  gain {:.1} nats (by chance, at most {} flights in 1,000 exceed {:.1}); moves the \
-             pulse by {:.1} us",
+            "  gain {:.1} nats (by chance, at most {} flights in 1,000 exceed {:.1}); {}",
             step.gain_nats,
             per_thousand(step.alpha),
             step.threshold_nats,
-            step.size_us
+            if step.size_us > 0.0 {
+                format!("moves the pulse by {:.1} us", step.size_us)
+            } else {
+                "told by how the drones lean, not by their pulse".to_owned()
+            }
         ),
         4,
     );
@@ -153,7 +156,14 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
 fn air(page: &mut Page, verdict: &Verdict) {
     let updraft_mps = verdict.noise.updraft_mps;
     let half = verdict.noise.updraft_half_mps;
-    if updraft_mps.abs() >= LEAST_UPDRAFT_MPS || half.is_some_and(|half| half > WIDE_MPS) {
+    if let Some(half) = half.filter(|half| *half > WIDE_MPS && *half > updraft_mps.abs()) {
+        let told = format!(
+            "Air: this flight does not tell a uniform updraft of the whole flight from none: {} ± {half:.2} \
+             m/s (95 %)",
+            signed(updraft_mps, 2)
+        );
+        page.say("", &told, 2);
+    } else if updraft_mps.abs() >= LEAST_UPDRAFT_MPS || half.is_some_and(|half| half > WIDE_MPS) {
         let within = half.map_or_else(String::new, |half| format!(" ± {half:.2}"));
         let told = format!(
             "Air: the whole flight is explained best in a uniform updraft of {}{within} m/s{}",

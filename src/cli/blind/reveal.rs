@@ -47,6 +47,7 @@ fn text(record: &BlindRecord) -> String {
     if let Some(shrink) = &record.shrink {
         lines.push(format!("Gap:      {}", gap_words(shrink)));
     }
+    lines.extend(record.air.iter().map(|air| format!("Air:      {air}")));
     lines.push(String::new());
     lines.extend(record.words.iter().cloned());
     lines.push(String::new());

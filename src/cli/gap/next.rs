@@ -8,6 +8,7 @@ use crate::base::plain::Shown as _;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::words;
+use crate::gap::next::result::Asked;
 use crate::report::next_terminal;
 use crate::workflow::gap::next::{self, Proposed, Wish};
 
@@ -95,5 +96,6 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
     }
     context.result(path)?;
     context.say(&format!("{} -> {}", words::count(next.questions.len(), "question"), path.shown()));
-    Ok(Exit::Done)
+    let is_told_ever = |asked: &Asked| asked.reached || asked.flights_needed.is_some();
+    Ok(if next.questions.iter().any(is_told_ever) { Exit::Done } else { Exit::Nothing })
 }

@@ -59,14 +59,6 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
         seal::truth_path(folder).shown()
     ));
     let flown = fly::fly(&truth, &play::flight(folder), Some(host.stop_flag()))?;
-    host.say(&format!(
-        "Flown: {} in {} air, {} of {} -> {}",
-        game.protocol.template(),
-        game.air.name(),
-        words::count(flown.logs, "log"),
-        words::count(usize::from(truth.slots()), "drone"),
-        play::flight(folder).shown()
-    ));
     if flown.logs == 0 {
         play::remove(folder)?;
         // Only where nothing else lies in it.
@@ -79,6 +71,14 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
             game.wind_mps.map_or_else(String::new, |wind| format!(", {wind:.1} m/s of wind"))
         )));
     }
+    host.say(&format!(
+        "Flown: {} in {} air, {} of {} -> {}",
+        game.protocol.template(),
+        game.air.name(),
+        words::count(flown.logs, "log"),
+        words::count(usize::from(truth.slots()), "drone"),
+        play::flight(folder).shown()
+    ));
     let file = GameFile {
         schema: GAME_SCHEMA.to_owned(),
         made_by: made_by(),

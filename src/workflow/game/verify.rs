@@ -214,7 +214,11 @@ impl Checks<'_> {
             }
             return None;
         }
-        let again = proof::again(self.folder, None, None);
+        let advice = if revealed {
+            proof::PUT_BACK.to_owned()
+        } else {
+            proof::anew(&proof::again(self.folder, None, None))
+        };
         let found = read_whole(&path, MAX_GAME_BYTES).map(|bytes| sha256(&bytes));
         if let (Ok(found), Some(record)) = (&found, record)
             && *found != record.verdict_sha256
@@ -226,7 +230,7 @@ impl Checks<'_> {
             self.add(&path, "", Some(problem));
             return None;
         }
-        match proof::read(&compared, &again) {
+        match proof::read(&compared, &advice) {
             Ok(proven) => {
                 // What the seal was opened for was held against the flight then.
                 let game = game.filter(|_| record.is_none());

@@ -168,10 +168,12 @@ fn output(request: &Request) -> Result<PathBuf, WorkflowError> {
         )));
     }
     let has_verdict = folder.join(VERDICT).exists();
-    if let Some(game) = &request.campaign
-        && record::path(game).exists()
-        && (has_verdict || request.output.is_none())
-    {
+    let is_opened = |game: &Path| record::path(game).exists();
+    // The verdict of an opened game stays, also where its flight alone is compared.
+    let beside = has_verdict && folder.parent().is_some_and(is_opened);
+    let own = request.campaign.as_deref().is_some_and(is_opened)
+        && (has_verdict || request.output.is_none());
+    if beside || own {
         let is = if has_verdict { "is" } else { "was" };
         return Err(WorkflowError::Usage(format!(
             "{} {is} the verdict of a game whose seal was opened, and who knows the truth cannot be asked again; \

@@ -195,7 +195,7 @@ impl Before {
             )));
         }
         let again = again(campaign, wish.flight.as_deref(), wish.gap.as_deref());
-        let Proven { verdict, .. } = proof::read(&compared, &again)?;
+        let Proven { verdict, .. } = proof::read(&compared, &proof::anew(&again))?;
         let (folder, plan) = flight_of(campaign, wish.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
             WorkflowError::Usage(format!(

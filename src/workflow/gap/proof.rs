@@ -49,35 +49,41 @@ pub(crate) fn again(campaign: &Path, flight: Option<&str>, folder: Option<&Path>
     command.join(" ")
 }
 
-/// Reads the verdict of a comparison that nobody has edited, nor its model. `again` is the command that
-/// makes it anew.
+/// What to do about a comparison that was edited: to make it anew by a command.
+pub(crate) fn anew(again: &str) -> String {
+    format!("compare again (`{again}`)")
+}
+
+/// What to do where it cannot be made anew, because somebody knows the truth.
+pub(crate) const PUT_BACK: &str = "put it back as it was: the seal was opened for it";
+
+/// Reads the verdict of a comparison that nobody has edited, nor its model. `advice` is what to do if it was.
 ///
 /// # Errors
 /// When a file cannot be read or was edited, or there is no proof.
-pub(crate) fn read(folder: &Path, again: &str) -> Result<Proven, WorkflowError> {
+pub(crate) fn read(folder: &Path, advice: &str) -> Result<Proven, WorkflowError> {
     let path = folder.join(VERDICT);
     let bytes = read_whole(&path, MAX_BYTES)?;
     let proof = folder.join(PROOF);
     if !proof.is_file() {
         return Err(WorkflowError::Usage(format!(
-            "{} has no {PROOF} beside it, so nobody can tell whether it was edited; compare again \
-             (`{again}`)",
+            "{} has no {PROOF} beside it, so nobody can tell whether it was edited; {advice}",
             path.shown()
         )));
     }
     let text = read_whole(&proof, MAX_BYTES)?;
     let text = String::from_utf8_lossy(&text);
     let found = sha256(&bytes);
-    unedited(&text, &path, &found, again)?;
+    unedited(&text, &path, &found, advice)?;
     let model = folder.join(MODEL);
-    unedited(&text, &model, &sha256(&read_whole(&model, MAX_BYTES)?), again)?;
+    unedited(&text, &model, &sha256(&read_whole(&model, MAX_BYTES)?), advice)?;
     let verdict = parse::json(&bytes)
         .map_err(|error| CampaignError::Json { path, reason: error.to_string() })?;
     Ok(Proven { verdict, sha256: found })
 }
 
 /// Refuses a file whose hash is not in the proof.
-fn unedited(proof: &str, path: &Path, found: &str, again: &str) -> Result<(), WorkflowError> {
+fn unedited(proof: &str, path: &Path, found: &str, advice: &str) -> Result<(), WorkflowError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let written = proof.lines().find_map(|line| {
         let (hash, file) = line.split_once("  ")?;
@@ -88,7 +94,7 @@ fn unedited(proof: &str, path: &Path, found: &str, again: &str) -> Result<(), Wo
     }
     Err(WorkflowError::Usage(format!(
         "{} was edited after `updraft gap` wrote it: its SHA-256 is {found}, in {PROOF} stands {}; \
-         compare again (`{again}`)",
+         {advice}",
         path.shown(),
         written.unwrap_or("none")
     )))
