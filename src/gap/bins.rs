@@ -110,6 +110,9 @@ pub struct BinValues {
     pub loaded_v: f64,
     /// Electrical power, W; NaN if it was not logged.
     pub power_w: f64,
+    /// Whether a model's drone did not hold the course there, and its pulse and lean are not those of steady flight. Measured
+    /// drones that did not are left out.
+    pub carried_away: bool,
 }
 
 #[cfg(test)]

@@ -172,7 +172,11 @@ impl Comparison {
                         None => Ok(values.clone()),
                     }
                 }
-                Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, air_mps),
+                Simulated::Refly(plan) => {
+                    let mut values = fly_groups(data, &vehicle, plan, air_mps)?;
+                    lean_steadily(data, &mut values, law, air_mps);
+                    Ok(values)
+                }
                 Simulated::Closed => Ok(data.as_flown()),
             }
         };
@@ -246,9 +250,10 @@ impl Comparison {
             }
             _ => simulated_scene.pulses(&vehicle)?,
         };
-        if matches!(simulated, Simulated::Closed) {
-            for (group, bins) in side.iter_mut().enumerate() {
-                for (bin, values) in bins.iter_mut().enumerate() {
+        let is_closed = matches!(simulated, Simulated::Closed);
+        for (group, bins) in side.iter_mut().enumerate() {
+            for (bin, values) in bins.iter_mut().enumerate() {
+                if is_closed || values.carried_away {
                     values.pulse_us = closed.at(group, 0, bin);
                 }
             }
@@ -756,6 +761,25 @@ fn fly_groups(
             Ok(refly(vehicle, plan, slot, &group.bins, air_mps, exponent)?)
         })
         .collect()
+}
+
+/// Where a model's drone was carried away, the steady lean that it would have had on its course in this air, show frame, m/s:
+/// what it lacks of that when it flies back is none of the measured drone's.
+fn lean_steadily(
+    data: &Data,
+    values: &mut [Vec<Option<BinValues>>],
+    law: LeanLaw,
+    [x_mps, y_mps, updraft_mps]: [f64; 3],
+) {
+    let law = LeanLaw { updraft_mps, ..law };
+    for (group, values) in data.groups.iter().zip(values) {
+        for (bin, values) in group.bins.iter().zip(values) {
+            if let Some(values) = values.as_mut().filter(|values| values.carried_away) {
+                let [x, y, climb_mps] = bin.velocity_mps;
+                values.lean_rad = law.lean([x - x_mps, y - y_mps], climb_mps);
+            }
+        }
+    }
 }
 
 /// Bins of another simulation, with what a change of the model does in this one.

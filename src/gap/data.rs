@@ -507,6 +507,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         resting_v: sum.resting_v / count,
         loaded_v: sum.loaded_v / count,
         power_w: sum.power_w / count,
+        carried_away: false,
     })
 }
 

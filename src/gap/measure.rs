@@ -11,7 +11,7 @@ const GAP_S: f64 = 1.0;
 /// limits falls behind (AirSim's quad by 0.45 m/s at 7 m/s through the air; ArduPilot's own frame, which leans by 30 degrees
 /// at most, by 1.2 m/s on a leg of 3 m/s against 8 m/s of wind, where it is off by less than 0.2 m/s on all legs that it can fly).
 /// Chosen below that.
-const FOLLOW_MPS: f64 = 0.3;
+pub(super) const FOLLOW_MPS: f64 = 0.3;
 /// Quantum of a logged pulse, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
 /// Share of samples at a limit from which a bin counts as saturated. Chosen, not measured.
@@ -77,6 +77,7 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
         resting_v: of_battery(&flight.resting_v).unwrap_or(f64::NAN),
         loaded_v: loaded_v.unwrap_or(f64::NAN),
         power_w: power_w.unwrap_or(f64::NAN),
+        carried_away: false,
     };
     (values.pulse_us.is_finite() && values.height_m.is_finite()).then_some(values)
 }

@@ -3,6 +3,7 @@
 use std::io;
 
 use super::bins::{Bin, BinValues};
+use super::measure::FOLLOW_MPS;
 use super::memory::{Digest, Memory};
 use crate::base::time::GpsTime;
 use crate::effects::{Role, find};
@@ -91,8 +92,16 @@ struct Sums {
     height_m: f64,
     lean_rad: [f64; 2],
     resting_v: f64,
-    /// First and last time, s, with the horizontal velocity then, m/s.
-    ends: Option<[(f64, [f64; 2]); 2]>,
+    /// First and last moment.
+    ends: Option<[End; 2]>,
+}
+
+/// Where a drone is in level directions at the first or the last moment of a bin, and how fast.
+#[derive(Clone, Copy)]
+struct End {
+    time_s: f64,
+    place_m: [f64; 2],
+    velocity_mps: [f64; 2],
 }
 
 struct BinRecorder<'a> {
@@ -117,12 +126,17 @@ impl<'a> BinRecorder<'a> {
     }
 
     fn values(self, thrust_exponent: f64) -> Vec<Option<BinValues>> {
-        let value = |sums: Sums| {
+        let value = |(sums, bin): (Sums, &Bin)| {
             let mean = |sum: f64| sum / sums.count;
-            let accelerated = sums.ends.map_or([0.0; 2], |[first, last]| {
-                let apart_s = (last.0 - first.0).max(0.1);
-                [0, 1].map(|axis| (last.1[axis] - first.1[axis]) / apart_s / GRAVITY)
-            });
+            let rate = |of: fn(&End) -> [f64; 2]| {
+                sums.ends.map_or([0.0; 2], |[first, last]| {
+                    let apart_s = (last.time_s - first.time_s).max(0.1);
+                    [0, 1].map(|axis| (of(&last)[axis] - of(&first)[axis]) / apart_s)
+                })
+            };
+            let accelerated = rate(|end| end.velocity_mps).map(|mps2| mps2 / GRAVITY);
+            let [x_mps, y_mps] = rate(|end| end.place_m);
+            let beside_mps = (x_mps - bin.velocity_mps[0]).hypot(y_mps - bin.velocity_mps[1]);
             let lean_rad = [0, 1].map(|axis| mean(sums.lean_rad[axis]) - accelerated[axis]);
             let cos = lean_rad[0].hypot(lean_rad[1]).cos();
             (sums.count > 0.0).then(|| BinValues {
@@ -133,9 +147,10 @@ impl<'a> BinRecorder<'a> {
                 resting_v: mean(sums.resting_v),
                 loaded_v: f64::NAN,
                 power_w: f64::NAN,
+                carried_away: beside_mps > FOLLOW_MPS,
             })
         };
-        self.sums.into_iter().map(value).collect()
+        self.sums.into_iter().zip(self.bins).map(value).collect()
     }
 }
 
@@ -163,8 +178,12 @@ impl Recorder for BinRecorder<'_> {
         sums.climb_mps += moment.estimate.velocity_mps.z;
         sums.height_m += moment.estimate.position_m.z - self.home_z_m;
         let up = moment.plant.motion().rotation.column(2).into_owned();
-        let velocity = moment.estimate.velocity_mps;
-        let now = (time_s, [velocity.x, velocity.y]);
+        let (place, velocity) = (moment.estimate.position_m, moment.estimate.velocity_mps);
+        let now = End {
+            time_s,
+            place_m: [place.x, place.y],
+            velocity_mps: [velocity.x, velocity.y],
+        };
         let first = sums.ends.map_or(now, |[first, _]| first);
         sums.ends = Some([first, now]);
         sums.lean_rad[0] += up.x;

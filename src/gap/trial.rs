@@ -55,6 +55,7 @@ pub(super) fn data(drones: usize, more_us: impl Fn(usize, &Bin) -> f64) -> Data 
             resting_v: f64::NAN,
             loaded_v: f64::NAN,
             power_w: f64::NAN,
+            carried_away: false,
         }
     };
     let measured =
