@@ -311,6 +311,14 @@ impl Messages {
         self.parameters.get("MOT_THST_EXPO").copied()
     }
 
+    /// Largest lean that the autopilot lets its position controller ask for, degrees.
+    pub(super) fn lean_limit_deg(&self) -> Option<f64> {
+        let value = |name: &str| self.parameters.get(name).copied().filter(|limit| *limit > 0.0);
+        // Hundredths of a degree until ArduCopter 4.6, then degrees by another name.
+        let of_vehicle = value("ANGLE_MAX").map(|limit| limit / 100.0).or(value("ATC_ANGLE_MAX"));
+        value("PSC_ANGLE_MAX").or(of_vehicle)
+    }
+
     /// Pulse widths between which a spinning motor is kept, us.
     pub(super) fn pulse_limits_us(&self) -> (f64, f64) {
         let value = |name: &str| self.parameters.get(name).copied().filter(|v| *v > 0.0);
@@ -562,6 +570,23 @@ mod tests {
         units: "s--------",
         multipliers: "C--------",
     };
+
+    #[test]
+    fn the_largest_lean_is_known_in_either_unit() {
+        let log =
+            Log::from_bytes(LogWriter::new(Vec::new(), &[&RCOU_3_2]).unwrap().finish().unwrap());
+        let limit_deg = |parameters: &[(&str, f64)]| {
+            let mut messages = Messages::read(&log);
+            for (name, value) in parameters {
+                messages.parameters.insert((*name).to_owned(), *value);
+            }
+            messages.lean_limit_deg()
+        };
+        assert_eq!(limit_deg(&[]), None);
+        assert_eq!(limit_deg(&[("ANGLE_MAX", 4500.0), ("PSC_ANGLE_MAX", 0.0)]), Some(45.0));
+        assert_eq!(limit_deg(&[("ANGLE_MAX", 4500.0), ("PSC_ANGLE_MAX", 20.0)]), Some(20.0));
+        assert_eq!(limit_deg(&[("ATC_ANGLE_MAX", 30.0)]), Some(30.0));
+    }
 
     #[test]
     fn outputs_of_old_firmware_are_read() {

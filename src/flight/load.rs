@@ -128,6 +128,7 @@ pub(super) fn load(
         armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
         pulse_limits_us,
         thrust_expo: messages.thrust_expo(),
+        lean_limit_deg: messages.lean_limit_deg(),
         cut_off_at_m,
         place: Place::of(&messages).map(|place| place.map(cut)),
         first_fix_deg: place.map(|(_, latitude, longitude)| (latitude, longitude)),

@@ -112,6 +112,9 @@ pub struct Flight {
     pub pulse_limits_us: (f64, f64),
     /// Share of the square in the motors' thrust that the autopilot counts with (`MOT_THST_EXPO`), if the log has it.
     pub thrust_expo: Option<f64>,
+    /// Largest lean that the autopilot lets its position controller ask for, degrees (`PSC_ANGLE_MAX`, else `ANGLE_MAX`), if the log
+    /// has it.
+    pub lean_limit_deg: Option<f64>,
     /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
     pub first_fix_deg: Option<(f64, f64)>,
     /// Place on the globe over time; absent: the log has none.

@@ -93,6 +93,18 @@ pub(super) fn cut(
     })
 }
 
+/// Cosine of the angle by which two headings differ at least. Chosen: 45 degrees.
+const HEADINGS_APART: f64 = 0.7;
+
+/// Whether legs with these velocities, m/s, are flown in two headings: one alone tells no law apart from a wind.
+pub(super) fn have_two_headings(legs_mps: impl Iterator<Item = [f64; 3]>) -> bool {
+    let mut first: Option<[f64; 2]> = None;
+    legs_mps.map(|[x, y, _]| [x / x.hypot(y), y / x.hypot(y)]).any(|[x, y]| {
+        let [first_x, first_y] = *first.get_or_insert([x, y]);
+        x * first_x + y * first_y < HEADINGS_APART
+    })
+}
+
 /// Measured values of one drone in one bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BinValues {
@@ -110,8 +122,8 @@ pub struct BinValues {
     pub loaded_v: f64,
     /// Electrical power, W; NaN if it was not logged.
     pub power_w: f64,
-    /// Whether a model's drone did not hold the course there, and its pulse and lean are not those of steady flight. Measured
-    /// drones that did not are left out.
+    /// Whether a model's drone did not hold its course there, or leaned as far as its autopilot lets it: its pulse and lean are not
+    /// those of steady flight. Measured drones that the wind carries away are left out.
     pub carried_away: bool,
 }
 
@@ -119,6 +131,15 @@ pub struct BinValues {
 mod tests {
     use super::*;
     use crate::mission::resolve::resolve;
+
+    #[test]
+    fn legs_out_and_back_are_two_headings_and_one_leg_is_none() {
+        let two = |legs_mps: &[[f64; 3]]| have_two_headings(legs_mps.iter().copied());
+        assert!(two(&[[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0]]));
+        assert!(two(&[[3.0, 0.0, 0.0], [6.0, 0.0, 0.0], [0.0, 3.0, 0.0]]));
+        assert!(!two(&[[3.0, 0.0, 0.0], [6.0, 1.0, 0.0]]));
+        assert!(!two(&[]));
+    }
 
     #[test]
     fn the_paper_ladder_has_its_bins_after_the_transients() {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::bins::{Bin, BinValues, of_segments};
+use super::bins::{Bin, BinValues, have_two_headings, of_segments};
 use super::left_out::LeftOut;
 use super::measure::measured;
 use super::steady::IDLE_US;
@@ -127,9 +127,10 @@ impl Data {
         self.groups.iter().map(|group| group.bins.len()).collect()
     }
 
-    /// Whether anything is flown over ground.
+    /// Whether legs over ground are flown in two headings at least.
     pub(super) fn has_legs(&self) -> bool {
-        self.groups.iter().any(|group| group.bins.iter().any(Bin::is_horizontal))
+        let bins = self.groups.iter().flat_map(|group| &group.bins);
+        have_two_headings(bins.filter(|bin| bin.is_horizontal()).map(|bin| bin.velocity_mps))
     }
 
     /// Drones in steady bins of the plan's groups.

@@ -13,7 +13,8 @@ use crate::sim::SimError;
 pub enum GapError {
     /// No drone has steady flight.
     #[error(
-        "no log has steady flight of the plan to compare{}",
+        "no log has steady flight of the plan to compare: gaps, motors at their limits, or wind in which the drones lean as far as \
+         their autopilot lets them{}",
         listed(.reasons)
     )]
     NothingMeasured {
@@ -22,8 +23,8 @@ pub enum GapError {
     },
     /// Measurement and simulation have too few bins in common.
     #[error(
-        "measurement and simulation have too little steady flight in common: gaps, motors at their \
-         limits (`updraft analyze` says where), or were they flown from different plans?"
+        "measurement and simulation have too little steady flight in common: gaps, motors or leans \
+         at their limits (`updraft analyze` says where), or were they flown from different plans?"
     )]
     NothingCommon,
     /// The pulse never changes.

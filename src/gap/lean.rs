@@ -1,6 +1,6 @@
 //! Wind from the leans of the fleet.
 
-use super::bins::{Bin, BinValues};
+use super::bins::{Bin, BinValues, have_two_headings};
 use super::data::{Data, Group};
 use super::filter::{Filter, LooksAt, Observation, State};
 use super::lean_fit::{Body, Fitted, Point, fit, fit_body, hovering_wind};
@@ -172,7 +172,8 @@ fn points<'a>(groups: impl Iterator<Item = (&'a Group, &'a Vec<[f64; 2]>)>) -> V
 
 /// Whether there are legs enough to fit a law to.
 fn moves(points: &[Point]) -> bool {
-    points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING
+    let legs = || points.iter().filter(|point| point.moves);
+    legs().count() >= FEWEST_MOVING && have_two_headings(legs().map(|point| point.velocity_mps))
 }
 
 /// A round body that the model lacks, by the legs that measured a law from the model's; `None`: there are none. `flown` is as

@@ -554,23 +554,24 @@ mod tests {
 
     #[test]
     fn a_model_that_cannot_fly_in_the_wind_that_only_leans_tell_says_so() {
-        let told = |lean_rad: f64, has_leg: bool| {
+        let told = |lean_rad: f64, legs_mps: &[f64]| {
             let mut data = trial::data(2, |_, _| 0.0);
             let values = data.groups[0].measured.iter_mut().flatten();
             values.for_each(|values| values.lean_rad = [lean_rad, 0.0]);
-            if has_leg {
-                data.groups[0].bins[2].velocity_mps = [4.0, 0.0, 0.0];
+            for (bin, leg_mps) in data.groups[0].bins.iter_mut().zip(legs_mps) {
+                bin.velocity_mps = [*leg_mps, 0.0, 0.0];
             }
             let error = GapError::from(SimError::Diverged { drone: 6, time_s: 20.0 });
             of_read_wind(error, &data, &trial::vehicle(), None).to_string()
         };
-        let text = told(0.15, false);
+        let text = told(0.15, &[]);
         assert!(
             text.starts_with("the model cannot fly in the ") && text.contains("legs"),
             "{text}"
         );
-        assert_eq!(told(0.15, true), "the model's flight failed", "legs tell the wind");
-        assert_eq!(told(0.01, false), "the model's flight failed", "hardly any wind");
+        assert_eq!(told(0.15, &[4.0, -4.0]), "the model's flight failed", "legs tell the wind");
+        assert_eq!(told(0.15, &[4.0]), text, "one does not");
+        assert_eq!(told(0.01, &[]), "the model's flight failed", "hardly any wind");
     }
 
     #[test]

@@ -12,6 +12,12 @@ const GAP_S: f64 = 1.0;
 /// at most, by 1.2 m/s on a leg of 3 m/s against 8 m/s of wind, where it is off by less than 0.2 m/s on all legs that it can fly).
 /// Chosen below that.
 pub(super) const FOLLOW_MPS: f64 = 0.3;
+/// Who leans to within this of its autopilot's limit is held back by it, degrees. Chosen: twice what a lean
+/// scatters by.
+pub(super) const LIMIT_MARGIN_DEG: f64 = 0.5;
+/// Share of a bin at the limit from which a drone is no longer in balance on its course, even where it is carried away slowly.
+/// Chosen, not measured.
+pub(super) const LIMITED_SHARE: f64 = 0.2;
 /// Quantum of a logged pulse, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
 /// Share of samples at a limit from which a bin counts as saturated. Chosen, not measured.
@@ -52,6 +58,9 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
     if moved_mps(flight, bin, turn).is_some_and(|[moved_x_mps, moved_y_mps]| {
         (moved_x_mps - x_mps).hypot(moved_y_mps - y_mps) > FOLLOW_MPS
     }) {
+        return None;
+    }
+    if is_held_back(flight, start_s, end_s) {
         return None;
     }
     let lean_rad = lean(flight, start_s, end_s, turn)?;
@@ -112,6 +121,20 @@ fn is_saturated(flight: &Flight, start_s: f64, end_s: f64) -> bool {
         > SATURATED_SHARE
         || share(flight.pulse_min_us.between(start_s, end_s), &|value| value <= low + QUANTUM_US)
             > SATURATED_SHARE
+}
+
+/// Whether a drone leans as far as its autopilot lets it: then it is not in balance on its course, even where it is carried away
+/// slowly.
+fn is_held_back(flight: &Flight, start_s: f64, end_s: f64) -> bool {
+    let Some(limit_deg) = flight.lean_limit_deg else { return false };
+    let times = flight.roll_rad.times_between(start_s, end_s);
+    let rolls = flight.roll_rad.between(start_s, end_s);
+    let limit = (limit_deg - LIMIT_MARGIN_DEG).to_radians().cos();
+    let held = times.iter().zip(rolls).filter(|(time_s, roll)| {
+        let pitch = flight.pitch_rad.at(**time_s, GAP_S).unwrap_or_default();
+        pitch.cos() * roll.cos() < limit
+    });
+    held.count() as f64 > LIMITED_SHARE * rolls.len() as f64
 }
 
 /// Mean horizontal part of the thrust axis, show frame.
@@ -210,6 +233,20 @@ mod tests {
         let mut of_a_table = log([1.0, 1.0, 2.0]);
         (of_a_table.north_m, of_a_table.east_m) = Default::default();
         assert!(one(&of_a_table, &bin([0.0, 0.0, 2.0]), turn, 1.0).is_some(), "it has no place");
+    }
+
+    #[test]
+    fn a_drone_that_its_autopilot_holds_back_is_not_measured() {
+        let bin = Bin { start_s: 3.0, end_s: 6.0, ..crate::gap::trial::ladder()[0].clone() };
+        let [.., climb_mps] = bin.velocity_mps;
+        let measures = |roll_deg: f64, lean_limit_deg: Option<f64>| {
+            let mut log = log([0.0, 0.0, climb_mps]);
+            log.roll_rad.value.iter_mut().for_each(|roll_rad| *roll_rad = roll_deg.to_radians());
+            one(&Flight { lean_limit_deg, ..log }, &bin, (0.0, 1.0), 1.0).is_some()
+        };
+        assert!(measures(28.0, Some(30.0)));
+        assert!(!measures(29.8, Some(30.0)));
+        assert!(measures(29.8, None), "the log says of no limit");
     }
 
     #[test]

@@ -3,11 +3,12 @@
 use std::io;
 
 use super::bins::{Bin, BinValues};
-use super::measure::FOLLOW_MPS;
+use super::measure::{FOLLOW_MPS, LIMIT_MARGIN_DEG, LIMITED_SHARE};
 use super::memory::{Digest, Memory};
 use crate::base::time::GpsTime;
 use crate::effects::{Role, find};
 use crate::mission::plan::{Plan, Slot};
+use crate::sim::autopilot::params::ANGLE_MAX_DEG;
 use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
@@ -15,6 +16,8 @@ use crate::vehicle::Vehicle;
 /// Bins of flights that were flown: those of one flight's searches, some megabytes.
 static FLOWN: Memory<Vec<Option<BinValues>>> = Memory::of(1_000);
 
+/// A lean from which the autopilot holds a drone back, degrees.
+const LIMIT_DEG: f64 = ANGLE_MAX_DEG - LIMIT_MARGIN_DEG;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
@@ -92,6 +95,8 @@ struct Sums {
     height_m: f64,
     lean_rad: [f64; 2],
     resting_v: f64,
+    /// Moments at which it leaned as far as the autopilot lets it.
+    at_limit: f64,
     /// First and last moment.
     ends: Option<[End; 2]>,
 }
@@ -120,6 +125,7 @@ impl<'a> BinRecorder<'a> {
             height_m: 0.0,
             lean_rad: [0.0; 2],
             resting_v: 0.0,
+            at_limit: 0.0,
             ends: None,
         };
         Self { bins, sums: bins.iter().map(|_| empty()).collect(), home_z_m, at: 0 }
@@ -147,7 +153,7 @@ impl<'a> BinRecorder<'a> {
                 resting_v: mean(sums.resting_v),
                 loaded_v: f64::NAN,
                 power_w: f64::NAN,
-                carried_away: beside_mps > FOLLOW_MPS,
+                carried_away: beside_mps > FOLLOW_MPS || mean(sums.at_limit) > LIMITED_SHARE,
             })
         };
         self.sums.into_iter().zip(self.bins).map(value).collect()
@@ -179,16 +185,45 @@ impl Recorder for BinRecorder<'_> {
         sums.height_m += moment.estimate.position_m.z - self.home_z_m;
         let up = moment.plant.motion().rotation.column(2).into_owned();
         let (place, velocity) = (moment.estimate.position_m, moment.estimate.velocity_mps);
-        let now = End {
-            time_s,
-            place_m: [place.x, place.y],
-            velocity_mps: [velocity.x, velocity.y],
-        };
+        let now =
+            End { time_s, place_m: [place.x, place.y], velocity_mps: [velocity.x, velocity.y] };
         let first = sums.ends.map_or(now, |[first, _]| first);
         sums.ends = Some([first, now]);
+        sums.at_limit += f64::from(up.z < LIMIT_DEG.to_radians().cos());
         sums.lean_rad[0] += up.x;
         sums.lean_rad[1] += up.y;
         sums.resting_v += moment.plant.battery().map_or(f64::NAN, |battery| battery.resting_v);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::bins::of_segments;
+    use crate::mission::resolve::resolve;
+    use crate::vehicle::library::builtin;
+
+    #[test]
+    fn a_drone_that_the_wind_carries_away_is_known() {
+        let vehicle = builtin("arducopter-sitl").unwrap();
+        let plan = resolve("calibration-counterphase", &[]).unwrap().flights.remove(0).plan;
+        let bins = of_segments(&plan.groups[0].segments);
+        let carried = |wind_mps: f64| {
+            let air_mps = [0.0, -wind_mps, 0.0];
+            let values = refly(&vehicle, &plan, &plan.slots[0], &bins, air_mps, 1.0).unwrap();
+            let carried = values.iter().map(|values| values.unwrap().carried_away);
+            carried
+                .zip(&bins)
+                .filter(|(carried, _)| *carried)
+                .map(|(_, bin)| bin.clone())
+                .collect::<Vec<Bin>>()
+        };
+        assert_eq!(carried(2.0), []);
+        let lost = carried(9.0);
+        let against = |bin: &Bin| bin.velocity_mps[1] > 1.0;
+        assert!(lost.iter().any(against), "a leg against the wind");
+        assert!(lost.iter().any(|bin| bin.kind.is_hover()), "the way back from it: {lost:?}");
+        assert!(lost.len() < bins.len() / 2, "{} of {}", lost.len(), bins.len());
     }
 }
