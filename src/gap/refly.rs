@@ -219,7 +219,7 @@ mod tests {
                 .map(|(_, bin)| bin.clone())
                 .collect::<Vec<Bin>>()
         };
-        assert_eq!(carried(2.0), []);
+        assert_eq!(carried(0.0), []);
         let lost = carried(9.0);
         let against = |bin: &Bin| bin.velocity_mps[1] > 1.0;
         assert!(lost.iter().any(against), "a leg against the wind");
