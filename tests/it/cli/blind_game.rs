@@ -161,6 +161,7 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     assert!(ended.out.contains("Hidden:   battery (0.700"), "{ended}");
     assert!(ended.out.contains("Verdict:  battery is missing."), "{ended}");
     assert!(ended.out.contains("Right: battery was hidden"), "{ended}");
+    assert!(ended.out.contains("Air:      updraft 0.00 m/s, the verdict has 0.00"), "{ended}");
     let again = bench.expect(0, &["blind", "reveal", "game", "--json"]);
     let record = again.json("updraft.blind-record/1");
     assert_eq!((&record["truth_sha256"], &record["right"]), (&game["truth_sha256"], &true.into()));
@@ -243,7 +244,16 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
         ended.err.contains("game/gap/verdict.json is the verdict of a game whose seal was opened"),
         "{ended}"
     );
+    // Nor by the flight alone.
+    let ended = bench.expect(2, &["gap", "game/flight", "-o", "game/gap"]);
+    assert!(ended.err.contains("is the verdict of a game whose seal was opened"), "{ended}");
     assert_eq!(fs::read(bench.path("game/gap/verdict.json")).unwrap(), verdict_of_this);
+    // What cannot be made again must be put back.
+    let written = swap(&bench, "game/gap/verdict.json", "battery", "buttery");
+    let ended = bench.expect(2, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("put it back as it was"), "{ended}");
+    assert!(!ended.err.contains("compare again"), "{ended}");
+    fs::write(bench.path("game/gap/verdict.json"), written).unwrap();
     fs::rename(bench.path("game/gap/verdict.json"), bench.path("kept")).unwrap();
     let ended = bench.expect(2, &["gap", "game"]);
     assert!(

@@ -147,9 +147,10 @@ fn steps_say_what_they_are() {
         assert!(two.contains(words), "{words}: {two}");
     }
     let three = section(&page(&unknown()), "steps");
-    for words in
-        ["Something unknown that depends on height", "It is about 4.00 sin(2 pi h/31.2 + 0.10) µs."]
-    {
+    for words in [
+        "Something unknown that depends on height",
+        "It is about 4.00 sin(2 pi h/31.2 + 0.10) µs (h: the height in m).",
+    ] {
         assert!(three.contains(words), "{words}: {three}");
     }
     let kept = "What is unknown is not in the model";
