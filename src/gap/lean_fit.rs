@@ -368,7 +368,8 @@ fn misfits<const SETS: usize>(
 ) -> [f64; SETS] {
     let of = at.map(|at| Candidate::of(&at, model, lacks));
     let airs = of.each_ref().map(|of| of.air);
-    let mut misfits = if lacks == Lacks::Body || model.feels_updraft() {
+    // Not for what is tried beside a model that does not feel it: a body would explain with an updraft what rotors must without.
+    let mut misfits = if model.feels_updraft() {
         let sizes = airs.map(|air| (air, [air.gust_mps, air.gust_mps, SHEAR, UPDRAFT_MPS]));
         leans.misfits_nats(&sizes, |_, _, by_climb| [0.0, 0.0, 0.0, -by_climb])
     } else {
