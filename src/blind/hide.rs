@@ -224,6 +224,8 @@ impl HiddenKind {
             Magnitude::AtTheEnd => {
                 sign * magnitude * counted_by_s(self.effect, &known).unwrap_or(flight_s) / flight_s
             }
+            // What is always negative is so with whichever sign it is asked for: its name says it.
+            Magnitude::Negative(chance) if size.is_some() && chance >= 1.0 => -magnitude,
             Magnitude::Negative(_) if size.is_some() => sign * magnitude,
             Magnitude::Negative(chance) => {
                 if unit(rng) < chance {
@@ -268,6 +270,7 @@ impl HiddenKind {
     /// Size in words: where it can be of either sign, with the one that it has.
     fn words(&self, magnitude: f64, value: f64) -> String {
         match self.magnitude {
+            Magnitude::Negative(chance) if chance >= 1.0 => format!("{magnitude:.3} {}", self.unit),
             Magnitude::EitherSign | Magnitude::Negative(_) | Magnitude::AtTheEnd => {
                 let signed = magnitude.copysign(value);
                 format!("{signed:+.3} {}", self.unit.replace(", of either sign", ""))
@@ -489,6 +492,13 @@ mod tests {
             kind_of(name).unwrap().draw(7, Base::Airsim, Protocol::Paper, 14.0).unwrap().value()
         };
         assert!(draw("battery-overcompensated") < 0.0);
+        for size in [0.5, -0.5] {
+            let kind = kind_of("battery-overcompensated").unwrap();
+            let hidden =
+                kind.draw_sized(7, Base::Airsim, Protocol::Paper, 14.0, Some(size)).unwrap();
+            assert_eq!(hidden.value(), -0.5, "asked for as {size}");
+            assert!(hidden.words.starts_with("0.500 share"), "{}", hidden.words);
+        }
         let drift = kind_of("response-drift").unwrap();
         let sized =
             drift.draw_sized(7, Base::Airsim, Protocol::Enhanced, 14.0, Some(-9.0)).unwrap();

@@ -41,3 +41,16 @@ fn inflow_is_named_with_the_updraft_that_it_was_flown_in() {
     // The share that 18 us/(m/s) in hover are.
     expect_named(("airsim-generic-quad", "enhanced"), -1.5, ("rotor-inflow", "18", 0.2628));
 }
+
+/// In gusts, a drag of the rotors was told as one of the body while only the body was fitted beside an updraft that nobody knows.
+#[test]
+fn a_drag_of_the_rotors_in_gusts_is_no_body() {
+    let bench = Bench::new();
+    let air = ["blind", "hide", "--air", "calm", "--wind", "4", "--seed", "61043"];
+    let game = ["--grid", "3x3", "--effect", "blade-flapping=0.03", "--quiet", "-o", "game"];
+    bench.expect(0, &[&air[..], &game].concat());
+    let ended = bench.run(&["gap", "game", "--json"]);
+    let verdict = &ended.json("updraft.gap/1")["verdict"];
+    let [step] = verdict["steps"].as_array().unwrap().as_slice() else { panic!("{ended}") };
+    assert_eq!(step["finding"]["effects"], serde_json::json!(["blade-flapping", "momentum-drag"]));
+}
