@@ -42,7 +42,7 @@ const GUST_S: f64 = 25.0;
 pub(super) const SHEAR: f64 = 0.2;
 /// Prior standard deviation of the updraft about the one that the law holds in, m/s. Leans of climbs and descents go with
 /// it where a body feels the whole air, and a wrong one must not be taken for a wind: on ArduPilot's own frame with twice its drag,
-/// 0.5 m/s of updraft that nobody knew of made 2.4 m/s of the wind out of 3.0, against what the legs said.
+/// in 0.5 m/s of updraft that nobody knew of, a wind of 3.0 m/s was read as 2.4, against what the legs said.
 const UPDRAFT_MPS: f64 = 2.0;
 /// Heights below this count as this, m: the roughness layer.
 const LOWEST_M: f64 = 1.0;
