@@ -454,12 +454,13 @@ mod tests {
 
     #[test]
     fn a_round_body_on_the_firmwares_own_vehicle_leans_by_its_trim() {
-        for size in [0.01, 0.03] {
+        // The largest doubles the frame's own drag.
+        for (size, most_lean) in [(0.01, 0.001), (0.03, 0.001), (0.184, 0.002)] {
             let mut vehicle = builtin("arducopter-sitl").unwrap();
             Role::BodyDragTop.set(&mut vehicle, size);
             Role::BodyDragSide.set(&mut vehicle, size);
             let (lean, air_mps) = most_off(&vehicle, &[1.0, 3.0, 6.0], &[-3.5, -1.0, 0.0, 3.5]);
-            assert!(lean < 0.001 && air_mps < 0.02, "{size}: {lean}, {air_mps} m/s");
+            assert!(lean < most_lean && air_mps < 0.02, "{size}: {lean}, {air_mps} m/s");
         }
     }
 
