@@ -3,13 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::classes::equivalent;
 use super::hide::{KINDS, ON_REQUEST};
 use super::play::Played;
 use super::scenario::Scenario;
 use super::score::{Called, HiddenOutcome, Outcome};
 use crate::effects::{Role, find};
 use crate::gap::Verdict;
-use crate::gap::verdict::{Finding, Shrink};
+use crate::gap::verdict::{Finding, Shrink, Step};
 use crate::gap::words::short;
 
 /// Name and version of the format of `hidden.json`.
@@ -86,9 +87,7 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
         });
     } else {
         words.extend(no_shrink(verdict));
-        let in_class = |name: &str| {
-            outcome.hidden.iter().any(|one| super::classes::equivalent(&one.effect, name))
-        };
+        let in_class = |name: &str| outcome.hidden.iter().any(|one| equivalent(&one.effect, name));
         let others: Vec<&str> =
             outcome.wrong_names.iter().map(String::as_str).filter(|name| !in_class(name)).collect();
         if !others.is_empty() {
@@ -97,8 +96,13 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
                 others.join(" and ")
             ));
         }
-        if outcome.wrong_classes > 0 {
-            words.push("Wrong: a class was given that has nothing of what was hidden.".to_owned());
+        match outcome.wrong_classes {
+            0 => {}
+            1 => words
+                .push("Wrong: a class was given that has nothing of what was hidden.".to_owned()),
+            some => words.push(format!(
+                "Wrong: {some} classes were given that have nothing of what was hidden."
+            )),
         }
         if outcome.wrong_unknowns > 0
             && outcome.hidden.iter().any(|one| one.called != Called::Unknown)
@@ -156,6 +160,24 @@ fn is_stated(effect: &str, size: f64, verdict: &Verdict) -> bool {
     })
 }
 
+/// A hidden effect as whoever hid it called it, and its own name where that is another.
+fn name_of(one: &HiddenOutcome) -> String {
+    if one.kind == one.effect {
+        one.effect.clone()
+    } else {
+        format!("{} ({})", one.kind, one.effect)
+    }
+}
+
+/// What of a verdict is of the class of an effect, in words.
+fn of_its_class(effect: &str, verdict: &Verdict) -> String {
+    let is_of_class =
+        |step: &&Step| step.finding.effects().iter().any(|one| equivalent(one, effect));
+    let classes = verdict.steps.iter().filter(is_of_class);
+    let words: Vec<String> = classes.map(|step| step.finding.effects().join(" or ")).collect();
+    words.join(" and ")
+}
+
 /// Whether a verdict has found something that is in no library.
 fn says_unknown(verdict: &Verdict) -> bool {
     verdict.steps.iter().any(|step| matches!(step.finding, Finding::Unknown { .. }))
@@ -167,7 +189,8 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
     } else {
         ""
     };
-    let what = format!("{} was hidden, at {}{}{of_all}", one.effect, short(one.value), unit(one));
+    let (name, size) = (name_of(one), short(one.value));
+    let what = format!("{name} was hidden, at {size}{}{of_all}", unit(one));
     let sizes = match (one.fitted, one.covered, one.relative_error) {
         (Some(fitted), covered, error) => {
             let off = error.map_or_else(String::new, |error| {
@@ -209,16 +232,20 @@ fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
                     outcome.found.join("; ")
                 )
             } else {
-                format!(
-                    "Near: {what}, and the verdict names {}, of the same class: this protocol \
-                     cannot tell them apart.",
-                    outcome.found.join(" and ")
-                )
+                match of_its_class(&one.effect, verdict) {
+                    none if none.is_empty() => format!(
+                        "Near: {what}, and the verdict calls it unknown and says what it depends on ({}).",
+                        outcome.found.join("; ")
+                    ),
+                    named => format!(
+                        "Near: {what}, and the verdict names {named}, of the same class: this protocol cannot tell \
+                         them apart."
+                    ),
+                }
             }
         }
         Called::Unknown => format!(
-            "Not recognised: {what}, and the verdict says no more than that something is missing \
-             ({}).",
+            "Not recognised: {what}, and the verdict has something unknown instead ({}).",
             outcome.found.join("; ")
         ),
         Called::Silent => {

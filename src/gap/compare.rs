@@ -14,9 +14,10 @@ use super::lean::{self, Wind, mean_wind, mean_wind_by, wind, wind_by};
 use super::lean_fit::Body;
 use super::lean_law::LeanLaw;
 use super::noise::GroupPattern;
-use super::refly::{mean_drone, refly};
+use super::refly::mean_drone;
 use super::response::{self, Response};
 use super::scene::Scene;
+use super::side::{Side, changed, fly_groups, fly_in_told_wind, lean_steadily};
 use super::spreads::{Differences, Spread};
 use super::stand_in::{as_flown, own_wind};
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
@@ -159,28 +160,33 @@ impl Comparison {
             }
             _ => None,
         };
-        let fly = |air_mps: [f64; 3]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
-            match simulated {
+        let moves = data.has_legs();
+        let fly = |air_mps: [f64; 3]| -> Result<([f64; 3], Side), GapError> {
+            let values = match simulated {
                 Simulated::Given { values, flew, .. } => {
                     let flew = mean_drone(flew);
                     match plan.filter(|_| flew != vehicle && as_flown.is_none()) {
                         Some(plan) => {
                             let without = fly_groups(data, &flew, plan, air_mps)?;
                             let with = fly_groups(data, &vehicle, plan, air_mps)?;
-                            Ok(changed(values, &without, &with))
+                            changed(values, &without, &with)
                         }
-                        None => Ok(values.clone()),
+                        None => values.clone(),
                     }
                 }
                 Simulated::Refly(plan) => {
-                    let mut values = fly_groups(data, &vehicle, plan, air_mps)?;
+                    let (air_mps, mut values) = if moves {
+                        fly_in_told_wind(data, &vehicle, plan, air_mps)?
+                    } else {
+                        (air_mps, fly_groups(data, &vehicle, plan, air_mps)?)
+                    };
                     lean_steadily(data, &mut values, law, air_mps);
-                    Ok(values)
+                    return Ok((air_mps, values));
                 }
-                Simulated::Closed => Ok(data.as_flown()),
-            }
+                Simulated::Closed => data.as_flown(),
+            };
+            Ok((air_mps, values))
         };
-        let moves = data.has_legs();
         // What the legs say of the wind is better than what hovers say by the model's law alone.
         let mut flown_mps = match near.filter(|_| moves) {
             _ if !moves || !matches!(simulated, Simulated::Refly(_)) => first,
@@ -196,12 +202,13 @@ impl Comparison {
                 air(flyable(data, law, wind_mps))
             }
             None => {
-                let values = fly(first)?;
+                let (first, values) = fly(first)?;
                 let whole = data.keep(|group, bin| values[group][bin].is_some());
                 air(flyable(data, law, mean_wind(&whole, law, Some((&flat(&values), first)))))
             }
         };
-        let mut values = fly(flown_mps)?;
+        let mut values;
+        (flown_mps, values) = fly(flown_mps)?;
         // What legs lack of their steady lean depends on the wind that they were flown in, and so does what hovers lack of
         // it after a climb or a descent at the end of what the vehicle can lean.
         let rounds = if matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
@@ -228,7 +235,11 @@ impl Comparison {
             if round == rounds {
                 break;
             }
-            (flown_mps, values) = (next_mps, fly(next_mps)?);
+            match fly(next_mps) {
+                // What was flown before is the nearest that it can.
+                Err(error) if moves && error.is_not_flown() => break,
+                flown => (flown_mps, values) = flown?,
+            }
         }
         if let Some(best) = nearest {
             (flown_mps, values) = (best.flown_mps, best.values);
@@ -695,7 +706,7 @@ struct Reading {
     /// How far the two are apart, m/s.
     apart_mps: f64,
     flown_mps: [f64; 3],
-    values: Vec<Vec<Option<BinValues>>>,
+    values: Side,
     /// Air that is flown in next, m/s.
     towards_mps: [f64; 3],
 }
@@ -736,74 +747,6 @@ const UPDRAFT_STEP_MPS: f64 = 0.1;
 const FLIGHTS_APART_S: f64 = 1e7;
 /// Fewest bins of a comparison. Chosen; the noise alone has 11 parameters.
 const FEWEST_BINS: usize = 12;
-
-fn fly_groups(
-    data: &Data,
-    vehicle: &Vehicle,
-    plan: &Plan,
-    air_mps: [f64; 3],
-) -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
-    use rayon::prelude::*;
-    data.groups
-        .par_iter()
-        .map(|group| {
-            // The drone nearest to the group's middle stands for all.
-            let middle = |axis: usize| {
-                mean(group.place_m.iter().map(|place| place[axis])).unwrap_or_default()
-            };
-            let (x, y) = (middle(0), middle(1));
-            let apart = |place: &[f64; 2]| (place[0] - x).hypot(place[1] - y);
-            let nearest = group.slots.iter().zip(&group.place_m);
-            let nearest = nearest.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)));
-            let slot =
-                nearest.and_then(|(slot, _)| plan.slot(*slot)).ok_or(GapError::NothingCommon)?;
-            let exponent = thrust_exponent(vehicle);
-            Ok(refly(vehicle, plan, slot, &group.bins, air_mps, exponent)?)
-        })
-        .collect()
-}
-
-/// Where a model's drone was carried away, the steady lean that it would have had on its course in this air, show frame, m/s:
-/// what it lacks of that when it flies back is none of the measured drone's.
-fn lean_steadily(
-    data: &Data,
-    values: &mut [Vec<Option<BinValues>>],
-    law: LeanLaw,
-    [x_mps, y_mps, updraft_mps]: [f64; 3],
-) {
-    let law = LeanLaw { updraft_mps, ..law };
-    for (group, values) in data.groups.iter().zip(values) {
-        for (bin, values) in group.bins.iter().zip(values) {
-            if let Some(values) = values.as_mut().filter(|values| values.carried_away) {
-                let [x, y, climb_mps] = bin.velocity_mps;
-                values.lean_rad = law.lean([x - x_mps, y - y_mps], climb_mps);
-            }
-        }
-    }
-}
-
-/// Bins of another simulation, with what a change of the model does in this one.
-fn changed(
-    values: &[Vec<Option<BinValues>>],
-    without: &[Vec<Option<BinValues>>],
-    with: &[Vec<Option<BinValues>>],
-) -> Vec<Vec<Option<BinValues>>> {
-    let bin = |((given, without), with): (
-        (&Option<BinValues>, &Option<BinValues>),
-        &Option<BinValues>,
-    )| {
-        let (given, without, with) = ((*given)?, (*without)?, (*with)?);
-        Some(BinValues {
-            pulse_us: given.pulse_us + with.pulse_us - without.pulse_us,
-            climb_mps: given.climb_mps + with.climb_mps - without.climb_mps,
-            ..given
-        })
-    };
-    let groups = values.iter().zip(without).zip(with);
-    groups
-        .map(|((given, without), with)| given.iter().zip(without).zip(with).map(bin).collect())
-        .collect()
-}
 
 /// Nodes and weights of the mean over a normal distribution: Gauss-Hermite with 7 points, exact for
 /// polynomials up to degree 13 (docs/physics.md, 2.5). A test checks its moments.

@@ -25,7 +25,7 @@ use super::sensor::sensor;
 use super::stand_in::{as_in_file, read_from_logs, stand_in};
 use super::verdict::{
     DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Regime, Rung, SensorChannel, Step,
-    VERDICT_SCHEMA, Verdict, is_strong_wind,
+    VERDICT_SCHEMA, Verdict, WindFound, is_strong_wind,
 };
 use super::warning::{Warning, warnings};
 use super::words::summary;
@@ -247,7 +247,8 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         rest: found.rest.clone(),
         detectable: detectable(&found)?,
         noise: noise(&found)?,
-        wind,
+        // As it is read with what was found: a drag that the model lacked looked like more wind before.
+        wind: WindFound { mean_mps: whole.wind.mean_mps, ..wind },
         drones: differences,
         gap: shrink,
         map: None,

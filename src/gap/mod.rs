@@ -50,6 +50,7 @@ mod response;
 mod scene;
 mod search;
 mod sensor;
+mod side;
 mod single;
 mod slopes;
 mod spreads;

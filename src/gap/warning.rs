@@ -16,6 +16,8 @@ use crate::numeric::upper_median;
 
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
+/// Share of the plan's bins below which it is said how few are compared. Chosen: a flight in air that the drones can fly keeps more.
+const FEW_BINS: f64 = 0.75;
 /// Wind that is read from leans alone is doubted aloud from this speed, m/s. Chosen: rotors' drag that was hidden in 1.5 m/s made 8 of
 /// it.
 const WINDY_MPS: f64 = 3.0;
@@ -38,6 +40,13 @@ pub enum Warning {
         /// Number of drones compared.
         drones: usize,
         /// Number of drones in the plan.
+        planned: usize,
+    },
+    /// Much of the plan's steady flight could not be compared.
+    FewBins {
+        /// Number of bins that are compared.
+        bins: usize,
+        /// Number of bins of the plan, in the groups that are compared.
         planned: usize,
     },
     /// A parameter was fitted to a bound of its range.
@@ -149,6 +158,12 @@ impl fmt::Display for Warning {
                 f,
                 "only {drones} of {planned} drones gave a usable log: intervals are wide, and groups \
                  may be uneven"
+            ),
+            Self::FewBins { bins, planned } => write!(
+                f,
+                "only {bins} of the {planned} stretches of steady flight in the plan are compared: in the others too \
+                 few drones followed the plan with motors and lean below their limits and with a whole log, and what \
+                 only those show was not looked for"
             ),
             Self::AtBound { effect, parameter } => write!(
                 f,
@@ -272,6 +287,7 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
     {
         warnings.push(Warning::FewDrones { drones, planned: plan.slots.len() });
     }
+    warnings.extend(input.plan.and_then(|plan| few_bins(plan, &found.comparison.data)));
     for parameter in &found.parameters {
         let value = value_of(&found.vehicle, parameter.effect, parameter.name);
         let (low, high) = parameter.bounds;
@@ -314,6 +330,15 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// Whether so little of a plan's steady flight is compared that it must be said.
+fn few_bins(plan: &Plan, data: &Data) -> Option<Warning> {
+    let bins: usize = data.bins_of_groups().iter().sum();
+    let is_compared = |group: &&Group| data.groups.iter().any(|one| one.name == group.name);
+    let groups = plan.groups.iter().filter(is_compared);
+    let planned = groups.map(|group| of_segments(&group.segments).len()).sum();
+    (bins as f64 <= FEW_BINS * planned as f64).then_some(Warning::FewBins { bins, planned })
 }
 
 /// Whether anything is to be flown over ground.

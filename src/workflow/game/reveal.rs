@@ -12,7 +12,6 @@ use crate::blind::{BlindError, play, seal};
 use crate::campaign::{FlightFolder, read_json};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::gap::next::is_of;
-use crate::workflow::gap::proof::PUT_BACK;
 use crate::workflow::gap::search::Searched;
 use crate::workflow::gap::{VERDICT, proof};
 use crate::workflow::host::Host;
@@ -58,8 +57,7 @@ pub fn run(
             compared.shown()
         )));
     }
-    let advice = if path.exists() { PUT_BACK.to_owned() } else { proof::anew(&again) };
-    let proven = proof::read(&compared, &advice)?;
+    let proven = proof::read(&compared, &proof::of_game(&again, path.exists()))?;
     if path.exists() {
         let record = opened_before(&path, &proven.sha256)?;
         still_whole(folder)?;

@@ -214,11 +214,8 @@ impl Checks<'_> {
             }
             return None;
         }
-        let advice = if revealed {
-            proof::PUT_BACK.to_owned()
-        } else {
-            proof::anew(&proof::again(self.folder, None, None))
-        };
+        let again = proof::again(self.folder, None, None);
+        let advice = proof::of_game(&again, revealed);
         let found = read_whole(&path, MAX_GAME_BYTES).map(|bytes| sha256(&bytes));
         if let (Ok(found), Some(record)) = (&found, record)
             && *found != record.verdict_sha256

@@ -54,8 +54,14 @@ pub(crate) fn anew(again: &str) -> String {
     format!("compare again (`{again}`)")
 }
 
-/// What to do where it cannot be made anew, because somebody knows the truth.
-pub(crate) const PUT_BACK: &str = "put it back as it was: the seal was opened for it";
+/// The same of a game's comparison, which cannot be made anew once the seal was opened: somebody knows the truth.
+pub(crate) fn of_game(again: &str, is_opened: bool) -> String {
+    if is_opened {
+        "put it back as it was: the seal was opened for it".to_owned()
+    } else {
+        anew(again)
+    }
+}
 
 /// Reads the verdict of a comparison that nobody has edited, nor its model. `advice` is what to do if it was.
 ///
