@@ -54,17 +54,14 @@ const SCATTER_FACTOR: f64 = 2.0;
 /// What the lean still lacks of its steady value on legs that are too short to settle, beyond what the
 /// simulator lacks there, rad: a quarter of a degree. Chosen.
 const UNSETTLED_RAD: f64 = 0.004;
-/// A law whose linear part is negative costs one nat for this much and four for twice as much, rad/(m/s): a
-/// lean never goes against the wind. A wall; its steepness does not matter.
-const NEGATIVE: f64 = 1e-4;
-/// The same of a body, rad/(m/s)².
-const NEGATIVE_BODY: f64 = 1e-5;
 /// Variables of the search, in numbers near 1: mean wind (two), the law's linear and quadratic parts, and
 /// the logarithms of gusts and scatter.
 const COUNT: usize = 6;
 /// What one unit of each variable is. Numerical.
 const UNITS: [f64; COUNT] = [1.0, 1.0, 0.01, 0.001, 1.0, 1.0];
-/// Place of the law's linear part, or of what a body adds to its quadratic part.
+/// Place of the law's linear part, or of what a body adds to its quadratic part. A search goes by its square root, as a lean
+/// never goes against the wind: many vehicles have none of it, and a search that ran against a wall there ended up to 3 nats and
+/// 0.2 m/s of wind beside the bottom.
 const DRAG: usize = 2;
 /// What one unit of the latter is, rad/(m/s)². Numerical.
 const BODY_UNIT: f64 = 0.001;
@@ -153,7 +150,7 @@ fn fitted(points: Vec<Point>, model: LeanLaw) -> Fitted {
     let model = usable(model);
     let (at, misfit_nats) = most_probable(&leans, model, Lacks::Rotors);
     let found = Candidate::of(&at, model, Lacks::Rotors).air;
-    // A wall is no knowledge: what is against it may be anything behind it.
+    // By the drag itself: at its bound, too, it is known only as well as the leans tell.
     let errors = standard_errors(&at, |at| misfit(&leans, at, model, Lacks::Rotors));
     Fitted {
         law: found.law,
@@ -223,29 +220,24 @@ pub(super) fn usable(model: LeanLaw) -> LeanLaw {
     LeanLaw { linear: model.linear.max(1e-4), square: model.square.max(1e-5), ..model }
 }
 
-/// Misfits with the wall, for several sets of variables at once.
-fn walled<const SETS: usize>(
-    leans: &Leans,
-    at: &[[f64; COUNT]; SETS],
-    model: LeanLaw,
-    lacks: Lacks,
-) -> [f64; SETS] {
-    let mut misfits = misfits(leans, at, model, lacks);
-    misfits.iter_mut().zip(at).for_each(|(misfit, at)| *misfit += wall(at, lacks));
-    misfits
+/// Variables of a search with the square root of the drag, as those with the drag.
+fn squared(mut at: [f64; COUNT]) -> [f64; COUNT] {
+    at[DRAG] *= at[DRAG];
+    at
 }
 
 /// The most probable variables and their misfit.
 fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], f64) {
-    let objective = |at: &[f64; COUNT]| walled(leans, &[*at], model, lacks)[0];
+    let objective = |at: &[f64; COUNT]| misfit(leans, &squared(*at), model, lacks);
     let slopes = |at: &[f64; COUNT], value: f64| {
-        differences_at_once(|all| walled(leans, all, model, lacks), at, value)
+        let all = |all: &[[f64; COUNT]; COUNT]| misfits(leans, &all.map(squared), model, lacks);
+        differences_at_once(all, at, value)
     };
     let search = |drag: &f64| {
         let mut start =
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
         let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).air.law);
-        (start[0], start[1]) = (x, y);
+        (start[0], start[1], start[DRAG]) = (x, y, drag.sqrt());
         let end = minimise_roughly(start, None, ROUGH_NATS, objective, slopes);
         (end.at, end.value)
     };
@@ -258,7 +250,8 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     };
     let ends: Vec<([f64; COUNT], f64)> = starts.par_iter().map(search).collect();
     let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
-    bottom(best.unwrap_or(([0.0; COUNT], f64::INFINITY)), objective, slopes)
+    let (at, nats) = bottom(best.unwrap_or(([0.0; COUNT], f64::INFINITY)), objective, slopes);
+    (squared(at), nats)
 }
 
 /// The bottom under a place with its misfit, nats: searched for again from where each search ends.
@@ -388,15 +381,6 @@ fn misfits<const SETS: usize>(
     misfits
 }
 
-/// Cost of a drag by which a drone would lean against the wind, nats.
-fn wall(at: &[f64; COUNT], lacks: Lacks) -> f64 {
-    let negative = match lacks {
-        Lacks::Rotors => NEGATIVE / UNITS[DRAG],
-        Lacks::Body => NEGATIVE_BODY / BODY_UNIT,
-    };
-    (at[DRAG].min(0.0) / negative).powi(2)
-}
-
 /// Standard errors in the search's units, by the curvature at the bottom; infinite where it has none.
 fn standard_errors(at: &[f64; COUNT], objective: impl Fn(&[f64; COUNT]) -> f64) -> [f64; COUNT] {
     let moved = |a: usize, by_a: f64, b: usize, by_b: f64| {
@@ -471,6 +455,33 @@ mod tests {
     }
 
     #[test]
+    fn a_search_ends_at_the_bottom_where_rotors_have_no_drag() {
+        let without = LeanLaw { linear: 0.0, ..law() };
+        for bent in [0.0, 0.3, 0.6, 0.9, 1.2] {
+            let mut flown = flown(without, 0.1);
+            for (bin, point) in flown.iter_mut().enumerate() {
+                point.lean_rad[0] += 0.002 * (bent * bin as f64).cos();
+            }
+            let leans = Leans::of(flown);
+            let model = usable(without);
+            let (at, nats) = most_probable(&leans, model, Lacks::Rotors);
+            // From somewhere beside it, several times: nothing is deeper.
+            for turn in 0..12 {
+                let mut beside = at;
+                beside[DRAG] = at[DRAG].sqrt();
+                for (place, value) in beside.iter_mut().enumerate() {
+                    *value += 0.1 * f64::from(7 * turn + 3 * place as i32).sin();
+                }
+                let of = |at: &[f64; COUNT]| misfit(&leans, &squared(*at), model, Lacks::Rotors);
+                let slopes =
+                    |at: &[f64; COUNT], value: f64| crate::numeric::differences(of, at, value);
+                let (_, deeper) = minimise(beside, of, slopes);
+                assert!(deeper > nats - 0.05, "{bent}, {turn}: {deeper} for {nats}");
+            }
+        }
+    }
+
+    #[test]
     fn an_updraft_that_leans_of_climbs_show_is_not_taken_for_a_wind() {
         let body = law().with_body(0.004);
         let in_updraft = LeanLaw { updraft_mps: 1.0, ..body };
@@ -493,8 +504,8 @@ mod tests {
     fn several_laws_at_once_are_each_as_alone() {
         let leans = Leans::of(flown(law(), 0.14));
         let sets = [0.2, 0.9, 1.7].map(|drag| [-4.0, 1.0, drag, 2.0, -0.5, -6.0]);
-        let at_once = walled(&leans, &sets, law(), Lacks::Rotors);
-        let alone = sets.map(|at| walled(&leans, &[at], law(), Lacks::Rotors)[0]);
+        let at_once = misfits(&leans, &sets, law(), Lacks::Rotors);
+        let alone = sets.map(|at| misfit(&leans, &at, law(), Lacks::Rotors));
         assert_eq!(at_once.map(f64::to_bits), alone.map(f64::to_bits));
     }
 
@@ -517,7 +528,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_at_the_wall_is_not_known_by_the_wall() {
+    fn a_law_at_its_bound_is_not_known_by_the_bound() {
         let without = LeanLaw { linear: 0.0, ..law() };
         let found = fit(flown(without, 0.0), law());
         assert!(found.law.linear < 1e-3, "{}", found.law.linear);

@@ -2,13 +2,13 @@
 
 /// Step of the difference quotients; variables are logarithms. Numerical.
 const STEP: f64 = 1e-4;
-/// The search ends when a step gains less, nats. Numerical: a four-thousandth of the threshold.
-const ENOUGH: f64 = 2e-3;
+/// The search ends when a step gains less, nats. Numerical: a thousandth of the threshold.
+const ENOUGH: f64 = 8e-3;
 /// Steps at most. Numerical; searches end earlier by [`ENOUGH`].
 const MOST_STEPS: usize = 40;
 /// The search ends, too, where a step promises less than this share of what is enough, by the curvature that was learned
 /// on the way and by that which the search began with. Numerical.
-const CERTAIN: f64 = 0.02;
+const CERTAIN: f64 = 0.1;
 /// Shares of a step that was too long, within which a parabola places the next one. Numerical.
 const SHORTER: [f64; 2] = [0.1, 0.5];
 /// Longest step of any variable: a factor of e. Numerical.
