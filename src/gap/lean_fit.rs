@@ -71,6 +71,10 @@ const BODY_DOUBT: f64 = 0.006;
 const BODIES: [f64; 3] = [0.0005, 0.002, 0.006];
 /// Place of its quadratic part.
 const SQUARE: usize = 3;
+/// Step of the first differences, in units. Numerical: across the valley between wind and law leans bend by 2e5 nats per (m/s)², along
+/// it by 60. With a step of 1e-4 slopes were off by 12 nats per m/s, and the bottom by 0.2 m/s and more. Misfits of some
+/// thousands of nats are rounded to 1e-12.
+pub(super) const SLOPE_STEP: f64 = 1e-6;
 /// Step of the second differences, in units. Numerical.
 const STEP: f64 = 0.02;
 
@@ -231,7 +235,7 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     let objective = |at: &[f64; COUNT]| misfit(leans, &squared(*at), model, lacks);
     let slopes = |at: &[f64; COUNT], value: f64| {
         let all = |all: &[[f64; COUNT]; COUNT]| misfits(leans, &all.map(squared), model, lacks);
-        differences_at_once(all, at, value)
+        differences_at_once(all, at, value, SLOPE_STEP)
     };
     let search = |drag: &f64| {
         let mut start =
@@ -473,8 +477,9 @@ mod tests {
                     *value += 0.1 * f64::from(7 * turn + 3 * place as i32).sin();
                 }
                 let of = |at: &[f64; COUNT]| misfit(&leans, &squared(*at), model, Lacks::Rotors);
-                let slopes =
-                    |at: &[f64; COUNT], value: f64| crate::numeric::differences(of, at, value);
+                let slopes = |at: &[f64; COUNT], value: f64| {
+                    crate::numeric::differences(of, at, value, SLOPE_STEP)
+                };
                 let (_, deeper) = minimise(beside, of, slopes);
                 assert!(deeper > nats - 0.05, "{bent}, {turn}: {deeper} for {nats}");
             }

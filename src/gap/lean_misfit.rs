@@ -3,7 +3,7 @@
 //! whatever the pulses tell.
 
 use super::lean_fit::{
-    GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, bottom, hovering_wind, usable,
+    GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, SLOPE_STEP, bottom, hovering_wind, usable,
 };
 use super::lean_law::LeanLaw;
 use crate::numeric::{differences_at_once, most};
@@ -58,7 +58,7 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
             misfits.iter_mut().zip(all).for_each(|(misfit, at)| *misfit += rare(at));
             misfits
         };
-        differences_at_once(all, at, value)
+        differences_at_once(all, at, value, SLOPE_STEP)
     };
     let [x, y] = hovering_wind(&leans.points, model);
     let start = [x, y, 0.0, 0.0, GUST_MPS.ln(), SCATTER_RAD.ln()];

@@ -1,14 +1,18 @@
 //! A quasi-Newton search for smooth functions of a few variables.
 
-/// Step of the difference quotients; variables are logarithms. Numerical.
-const STEP: f64 = 1e-4;
-/// The search ends when a step gains less, nats. Numerical: a thousandth of the threshold.
-const ENOUGH: f64 = 8e-3;
+/// Step of the difference quotients of functions of logarithms. Numerical.
+pub(crate) const LOGARITHM_STEP: f64 = 1e-4;
+/// The search ends when a step gains less, nats. Numerical: a four-thousandth of the threshold.
+const ENOUGH: f64 = 2e-3;
+/// The same of fits of the noise, of which there are hundreds in a comparison. Numerical: a thousandth of the threshold.
+const NOISE_ENOUGH: f64 = 8e-3;
 /// Steps at most. Numerical; searches end earlier by [`ENOUGH`].
 const MOST_STEPS: usize = 40;
 /// The search ends, too, where a step promises less than this share of what is enough, by the curvature that was learned
 /// on the way and by that which the search began with. Numerical.
-const CERTAIN: f64 = 0.1;
+const CERTAIN: f64 = 0.02;
+/// The same of fits of the noise.
+const NOISE_CERTAIN: f64 = 0.1;
 /// Shares of a step that was too long, within which a parabola places the next one. Numerical.
 const SHORTER: [f64; 2] = [0.1, 0.5];
 /// Longest step of any variable: a factor of e. Numerical.
@@ -49,7 +53,7 @@ pub(crate) fn minimise_roughly<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> Least<N, f64> {
-    of_values(start, alike, End { enough, again: false }, function, gradient_at)
+    of_values(start, alike, End { enough, again: false, ..End::WELL }, function, gradient_at)
 }
 
 /// As [`minimise`], of a function that tells with its value what its gradient is made from. The inverse of the second
@@ -60,7 +64,7 @@ pub(crate) fn minimise_known<const N: usize, T>(
     function: impl Fn(&[f64; N]) -> (f64, T),
     gradient_at: impl Fn(&[f64; N], &T) -> [f64; N],
 ) -> Least<N, T> {
-    descend(start, alike, End::WELL, function, gradient_at)
+    descend(start, alike, End::NOISE, function, gradient_at)
 }
 
 /// Where a search ends.
@@ -68,12 +72,15 @@ pub(crate) fn minimise_known<const N: usize, T>(
 struct End {
     /// Two steps that gain less are the last.
     enough: f64,
+    /// A step that promises less than this share of it is not taken.
+    certain: f64,
     /// Once more, with a fresh curvature, from where it ends first.
     again: bool,
 }
 
 impl End {
-    const WELL: Self = Self { enough: ENOUGH, again: true };
+    const WELL: Self = Self { enough: ENOUGH, certain: CERTAIN, again: true };
+    const NOISE: Self = Self { enough: NOISE_ENOUGH, certain: NOISE_CERTAIN, again: true };
 }
 
 /// As [`descend`], of a function that tells its value alone.
@@ -119,8 +126,8 @@ fn descend<const N: usize, T>(
             direction = gradient.map(|slope| -slope);
         }
         let promised = -0.5 * dot(&direction, &gradient);
-        let is_bottom = promised < CERTAIN * end.enough
-            && 0.5 * bilinear(&first(), &gradient) < CERTAIN * end.enough;
+        let is_bottom = promised < end.certain * end.enough
+            && 0.5 * bilinear(&first(), &gradient) < end.certain * end.enough;
         if is_bottom {
             break;
         }
@@ -161,13 +168,16 @@ fn descend<const N: usize, T>(
     Least { at, value, known, inverse: learned.unwrap_or(inverse) }
 }
 
-/// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.
+/// A gradient by difference quotients over a step, for functions without derivatives at hand; `value` is the function's there. The
+/// slope is off by half of the step times the curvature: where the function bends by many orders of magnitude more across a valley
+/// than along it, a step that is too long moves the bottom of the valley.
 pub(crate) fn differences<const N: usize>(
     function: impl Fn(&[f64; N]) -> f64,
     at: &[f64; N],
     value: f64,
+    step: f64,
 ) -> [f64; N] {
-    differences_at_once(|moved| moved.map(|place| function(&place)), at, value)
+    differences_at_once(|moved| moved.map(|place| function(&place)), at, value, step)
 }
 
 /// As [`differences`], of a function that is told for all places at once.
@@ -175,10 +185,11 @@ pub(crate) fn differences_at_once<const N: usize>(
     function: impl Fn(&[[f64; N]; N]) -> [f64; N],
     at: &[f64; N],
     value: f64,
+    step: f64,
 ) -> [f64; N] {
     let mut moved = [*at; N];
-    moved.iter_mut().enumerate().for_each(|(index, place)| place[index] += STEP);
-    function(&moved).map(|there| (there - value) / STEP)
+    moved.iter_mut().enumerate().for_each(|(index, place)| place[index] += step);
+    function(&moved).map(|there| (there - value) / step)
 }
 
 fn identity<const N: usize>() -> [[f64; N]; N] {
@@ -250,7 +261,7 @@ mod tests {
                 asked.set(asked.get() + 1);
                 (bowl(at), bowl(at))
             };
-            let slopes = |at: &[f64; 4], value: &f64| differences(bowl, at, *value);
+            let slopes = |at: &[f64; 4], value: &f64| differences(bowl, at, *value, LOGARITHM_STEP);
             let least = minimise_known(start, alike, function, slopes);
             assert!(least.value < 1e-2, "{}", least.value);
             (asked.get(), least.inverse)
@@ -265,7 +276,9 @@ mod tests {
     #[test]
     fn a_bent_valley_is_followed() {
         let valley = |[x, y]: &[f64; 2]| 20.0 * (y - x * x).powi(2) + (1.0 - x).powi(2);
-        let (at, value) = minimise([-1.2, 1.0], valley, |at, value| differences(valley, at, value));
+        let (at, value) = minimise([-1.2, 1.0], valley, |at, value| {
+            differences(valley, at, value, LOGARITHM_STEP)
+        });
         assert!(value < 1e-2 && (at[0] - 1.0).abs() < 0.1, "{at:?} {value}");
     }
 }

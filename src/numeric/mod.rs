@@ -30,7 +30,8 @@ pub(crate) use banded::Banded;
 pub(crate) use cholesky::cholesky;
 pub use line::Line;
 pub(crate) use minimise::{
-    Inverse, Least, differences, differences_at_once, minimise, minimise_known, minimise_roughly,
+    Inverse, LOGARITHM_STEP, Least, differences, differences_at_once, minimise, minimise_known,
+    minimise_roughly,
 };
 pub(crate) use moments::log_sum;
 pub use moments::{Moments, mean, rms};

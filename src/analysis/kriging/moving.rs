@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::neighbours::Reach;
 use super::scales::{DRIFT, Family, Found, Search};
-use crate::numeric::{differences, minimise};
+use crate::numeric::{LOGARITHM_STEP, differences, minimise};
 
 /// What the likelihood of drones that move conditions on.
 pub(super) const REACH: Reach = Reach { beside: 6, step: 4, own: 2 };
@@ -36,6 +36,7 @@ pub(super) fn drift(search: &Search<'_>, found: &Found) -> Option<[f64; 2]> {
         .filter(|(_, gain)| gain.is_finite())
         .max_by(|a, b| a.1.total_cmp(b.1))?;
     let loss = |at: &[f64; 2]| -gain(at);
-    let (best, least) = minimise(*start, loss, |at, value| differences(loss, at, value));
+    let (best, least) =
+        minimise(*start, loss, |at, value| differences(loss, at, value, LOGARITHM_STEP));
     (-least > gain(&[0.0; 2]) + WORTH).then_some(best)
 }

@@ -9,7 +9,7 @@ use super::shape::{
 use super::whiten::{White, Whitening};
 use crate::analysis::kriging::data::Rows;
 use crate::analysis::kriging::scales::ENOUGH;
-use crate::numeric::{Least, differences_at_once, minimise_roughly};
+use crate::numeric::{LOGARITHM_STEP, Least, differences_at_once, minimise_roughly};
 
 /// A peak before the values are seen: standard deviation, m/s. Thermals that small drones fly in; chosen.
 const PEAK_MPS: f64 = 2.0;
@@ -267,7 +267,8 @@ impl Fit<'_> {
                     let values = self.log_densities(&places.map(|numbers| (numbers, *at_s)));
                     std::array::from_fn(|index| -values[index])
                 };
-                let slopes = |at: &Numbers, value| differences_at_once(losses, at, value);
+                let slopes =
+                    |at: &Numbers, value| differences_at_once(losses, at, value, LOGARITHM_STEP);
                 let Least { at, value: least, .. } =
                     minimise_roughly(*start, None, ENOUGH, loss, slopes);
                 (at, *at_s, -least)

@@ -24,7 +24,7 @@ use super::scales::{
     COARSE, ENOUGH, Extent, FINE, Family, Found, LN_GUST, LN_LENGTH, LN_SD, LN_SLOW, LN_TIME,
     Point, Search, Whole, log_prior,
 };
-use crate::numeric::{Least, differences_at_once, extent, minimise_roughly};
+use crate::numeric::{LOGARITHM_STEP, Least, differences_at_once, extent, minimise_roughly};
 use fit::{Candidate, Fit, PEAK, Region, record};
 use shape::{DRIFT, DRIFT_MPS, PLACE, PLACE_M, SINK, Shape};
 use whiten::Whitening;
@@ -244,7 +244,7 @@ impl Looked<'_> {
             let values: Vec<f64> = places.par_iter().map(loss).collect();
             std::array::from_fn(|index| values[index])
         };
-        let slopes = |at: &[f64; 4], value| differences_at_once(losses, at, value);
+        let slopes = |at: &[f64; 4], value| differences_at_once(losses, at, value, LOGARITHM_STEP);
         let first = AGAIN.map(|index| start[index]);
         let Least { at: best, value: least, .. } =
             minimise_roughly(first, None, ENOUGH, loss, slopes);
