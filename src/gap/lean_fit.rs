@@ -31,9 +31,14 @@ const AGAIN: usize = 3;
 /// A search that gains less was at the bottom already, nats. Numerical.
 const BOTTOM_NATS: f64 = 0.02;
 /// Prior median of the gusts, m/s: 15 % of 1 to 6 m/s of wind are 0.15 to 0.9.
-pub(super) const GUST_MPS: f64 = 0.5;
+const GUST_MPS: f64 = 0.5;
 /// Prior standard deviation of the gusts, as a factor. Chosen wide.
 const GUST_FACTOR: f64 = 2.5;
+/// The same downwards: some days are still, and some flights are in a hall. With the former, what hardly moves with a gust, a
+/// law without a linear part, was as probable in still air as the law that legs of 3 and 6 m/s showed. Chosen wide.
+const STILL_FACTOR: f64 = 20.0;
+/// Gusts with which a search starts at least and at most, m/s. Numerical.
+const START_GUSTS_MPS: [f64; 2] = [0.003, 3.0];
 /// Time scale of the gusts, s, as in the benchmark. Not fitted; bins of 3 s hardly show it.
 const GUST_S: f64 = 25.0;
 /// Prior standard deviation of the exponent by which the wind grows with height: 1/7 over flat land, up to 0.3 over
@@ -51,6 +56,8 @@ const LOWEST_M: f64 = 1.0;
 pub(super) const SCATTER_RAD: f64 = 0.002;
 /// Prior standard deviation of the scatter, as a factor. Chosen.
 const SCATTER_FACTOR: f64 = 2.0;
+/// Scatter below which there is none, rad: attitudes are logged to a hundredth of a degree.
+const LEAST_SCATTER_RAD: f64 = 2e-4;
 /// What the lean still lacks of its steady value on legs that are too short to settle, beyond what the
 /// simulator lacks there, rad: a quarter of a degree. Chosen.
 const UNSETTLED_RAD: f64 = 0.004;
@@ -71,6 +78,8 @@ const BODY_DOUBT: f64 = 0.006;
 const BODIES: [f64; 3] = [0.0005, 0.002, 0.006];
 /// Place of its quadratic part.
 const SQUARE: usize = 3;
+/// Place of the logarithm of the gusts.
+const GUST: usize = 4;
 /// Step of the first differences, in units. Numerical: across the valley between wind and law leans bend by 2e5 nats per (m/s)², along
 /// it by 60. With a step of 1e-4 slopes were off by 12 nats per m/s, and the bottom by 0.2 m/s and more. Misfits of some
 /// thousands of nats are rounded to 1e-12.
@@ -240,8 +249,10 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     let search = |drag: &f64| {
         let mut start =
             [0.0, 0.0, *drag, model.square / UNITS[SQUARE], GUST_MPS.ln(), SCATTER_RAD.ln()];
-        let [x, y] = hovering_wind(&leans.points, Candidate::of(&start, model, lacks).air.law);
+        let law = Candidate::of(&start, model, lacks).air.law;
+        let [x, y] = hovering_wind(&leans.points, law);
         (start[0], start[1], start[DRAG]) = (x, y, drag.sqrt());
+        start[GUST] = hovering_gusts_mps(&leans.points, law, [x, y]).ln();
         let end = minimise_roughly(start, None, ROUGH_NATS, objective, slopes);
         (end.at, end.value)
     };
@@ -289,6 +300,17 @@ pub(super) fn hovering_wind(points: &[Point], law: LeanLaw) -> [f64; 2] {
     sum.map(|sum: f64| if count > 0.0 { sum / count } else { 0.0 })
 }
 
+/// Standard deviation along either axis of the air that a law reads there about its mean, m/s, within what a search starts with.
+pub(super) fn hovering_gusts_mps(points: &[Point], law: LeanLaw, mean_mps: [f64; 2]) -> f64 {
+    let hovers = points.iter().filter(|point| !point.moves);
+    let squares = hovers.map(|point| {
+        let air = law.air(point.lean_rad, point.velocity_mps[2]);
+        0.5 * ((air[0] + mean_mps[0]).powi(2) + (air[1] + mean_mps[1]).powi(2))
+    });
+    let [least_mps, most_mps] = START_GUSTS_MPS;
+    mean(squares).unwrap_or_default().sqrt().clamp(least_mps, most_mps)
+}
+
 /// A law in a mean wind, with what leans scatter by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InAir {
@@ -310,8 +332,8 @@ impl InAir {
         let [vx, vy, climb_mps] = point.velocity_mps;
         let air = [vx - self.mean_mps[0], vy - self.mean_mps[1]];
         let (wanted, slopes) = self.law.lean_and_slopes(air, climb_mps);
-        let scatter =
-            if point.moves { self.scatter_rad.hypot(UNSETTLED_RAD) } else { self.scatter_rad };
+        let more_rad = if point.moves { UNSETTLED_RAD } else { LEAST_SCATTER_RAD };
+        let scatter = self.scatter_rad.hypot(more_rad);
         let more_mps = self.mean_mps.map(|mean_mps| mean_mps * aloft);
         [0, 1].map(|axis| {
             let by_air = [-slopes.by_air[(axis, 0)], -slopes.by_air[(axis, 1)]];
@@ -326,7 +348,8 @@ impl InAir {
 
     /// Twice the nats that its gusts and scatter cost for being other than usual.
     pub(super) fn unusual(&self) -> f64 {
-        let gusts = (self.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln();
+        let factor = if self.gust_mps < GUST_MPS { STILL_FACTOR } else { GUST_FACTOR };
+        let gusts = (self.gust_mps / GUST_MPS).ln() / factor.ln();
         let scatter = (self.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln();
         gusts * gusts + scatter * scatter
     }
@@ -346,7 +369,7 @@ impl Candidate {
             Lacks::Rotors => LeanLaw { linear: at[DRAG] * UNITS[DRAG], square, ..model },
             Lacks::Body => LeanLaw { square, ..model }.with_body(at[DRAG] * BODY_UNIT),
         };
-        let (gust_mps, scatter_rad) = (at[4].exp(), at[5].exp());
+        let (gust_mps, scatter_rad) = (at[GUST].exp(), at[5].exp());
         Self { air: InAir { mean_mps: [at[0], at[1]], law, gust_mps, scatter_rad }, square }
     }
 }
@@ -477,12 +500,40 @@ mod tests {
                     *value += 0.1 * f64::from(7 * turn + 3 * place as i32).sin();
                 }
                 let of = |at: &[f64; COUNT]| misfit(&leans, &squared(*at), model, Lacks::Rotors);
-                let slopes = |at: &[f64; COUNT], value: f64| {
-                    crate::numeric::differences(of, at, value, SLOPE_STEP)
+                let slopes = |at: &[f64; COUNT], _: f64| {
+                    std::array::from_fn(|place| {
+                        let [after, before] = [1e-5, -1e-5].map(|step| {
+                            let mut moved = *at;
+                            moved[place] += step;
+                            of(&moved)
+                        });
+                        (after - before) / 2e-5
+                    })
                 };
                 let (_, deeper) = minimise(beside, of, slopes);
                 assert!(deeper > nats - 0.05, "{bent}, {turn}: {deeper} for {nats}");
             }
+        }
+    }
+
+    #[test]
+    fn in_still_air_the_law_is_the_one_that_legs_show() {
+        for scatter in [0.01, 0.1, 1.0] {
+            let mut flown = flown(law(), 0.0);
+            for point in &mut flown {
+                let [vx, vy, climb_mps] = point.velocity_mps;
+                let (windy, still) =
+                    (law().lean([vx + 5.0, vy - 2.0], climb_mps), law().lean([vx, vy], climb_mps));
+                point.lean_rad =
+                    [0, 1].map(|axis| scatter * (point.lean_rad[axis] - windy[axis]) + still[axis]);
+            }
+            let found = fit(flown, law());
+            let off = found.law.linear - law().linear;
+            let wind_mps = found.mean_mps[0].hypot(found.mean_mps[1]);
+            assert!(
+                off.abs() < 1e-3 && wind_mps < 0.02,
+                "{scatter}: {off} rad/(m/s), {wind_mps} m/s"
+            );
         }
     }
 

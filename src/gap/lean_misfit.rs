@@ -3,7 +3,8 @@
 //! whatever the pulses tell.
 
 use super::lean_fit::{
-    GUST_MPS, InAir, Leans, Point, SCATTER_RAD, SHEAR, SLOPE_STEP, bottom, hovering_wind, usable,
+    InAir, Leans, Point, SCATTER_RAD, SHEAR, SLOPE_STEP, bottom, hovering_gusts_mps, hovering_wind,
+    usable,
 };
 use super::lean_law::LeanLaw;
 use crate::numeric::{differences_at_once, most};
@@ -61,7 +62,8 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
         differences_at_once(all, at, value, SLOPE_STEP)
     };
     let [x, y] = hovering_wind(&leans.points, model);
-    let start = [x, y, 0.0, 0.0, GUST_MPS.ln(), SCATTER_RAD.ln()];
+    let gusts_mps = hovering_gusts_mps(&leans.points, model, [x, y]);
+    let start = [x, y, 0.0, 0.0, gusts_mps.ln(), SCATTER_RAD.ln()];
     let (_, nats) = bottom((start, f64::INFINITY), objective, slopes);
     if nats.is_finite() { COUNTED * nats } else { 0.0 }
 }
