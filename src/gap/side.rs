@@ -108,3 +108,37 @@ pub(super) fn changed(given: &Side, without: &Side, with: &Side) -> Side {
         .map(|((given, without), with)| given.iter().zip(without).zip(with).map(bin).collect())
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::trial;
+    use crate::mission::resolve::resolve;
+    use crate::vehicle::library::builtin;
+
+    #[test]
+    fn a_model_that_cannot_fly_in_the_wind_that_legs_tell_flies_in_a_little_less() {
+        let vehicle = builtin("pixel").unwrap();
+        let plan = resolve("calibration-counterphase", &[]).unwrap().flights.remove(0).plan;
+        let mut data = trial::data(1, |_, _| 0.0);
+        let group = &mut data.groups[0];
+        group.slots = vec![plan.slots[0].slot];
+        group.bins.truncate(2);
+        let flies =
+            |wind_mps: f64| fly_groups(&data, &vehicle, &plan, [0.0, -wind_mps, 2.0]).is_ok();
+        let too_fast =
+            (32..80).map(|fourths| 0.25 * f64::from(fourths)).find(|wind_mps| !flies(*wind_mps));
+        let too_fast_mps = too_fast.unwrap();
+        let air_mps = [0.0, -too_fast_mps, 2.0];
+        let (flown_in, side) = fly_in_told_wind(&data, &vehicle, &plan, air_mps).unwrap();
+        let share = flown_in[1] / air_mps[1];
+        assert!((0.9..0.98).contains(&share) && flown_in[2] == 2.0, "{flown_in:?}");
+        // Voltages are no numbers there.
+        let there = fly_groups(&data, &vehicle, &plan, flown_in).unwrap();
+        assert_eq!(format!("{side:?}"), format!("{there:?}"));
+        let whole =
+            fly_groups(&data, &vehicle, &plan, [0.0, -1.5 * too_fast_mps, 2.0]).unwrap_err();
+        let failed = fly_in_told_wind(&data, &vehicle, &plan, [0.0, -1.5 * too_fast_mps, 2.0]);
+        assert_eq!(failed.unwrap_err().to_string(), whole.to_string());
+    }
+}

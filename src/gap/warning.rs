@@ -376,7 +376,29 @@ fn groups_lost(plan: &Plan, data: &Data) -> Vec<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gap::trial;
     use crate::gap::verdict::{Shrink, Verdict, WindFound};
+    use crate::mission::resolve::resolve;
+
+    #[test]
+    fn much_of_a_plan_that_is_not_compared_is_said() {
+        let plan = resolve("calibration-counterphase", &[]).unwrap().flights.remove(0).plan;
+        let planned = of_segments(&plan.groups[0].segments);
+        let mut data = trial::data(2, |_, _| 0.0);
+        data.groups[0].name.clone_from(&plan.groups[0].name);
+        let mut said = |bins: usize| {
+            data.groups[0].bins = planned[..bins].to_vec();
+            few_bins(&plan, &data).map(|warning| warning.to_string())
+        };
+        let count = planned.len();
+        assert_eq!(said(count * 4 / 5), None);
+        let few = count * 7 / 10;
+        let wanted = format!(
+            "only {few} of the {count} stretches of steady flight in the plan are compared: "
+        );
+        let warning = said(few).unwrap();
+        assert!(warning.starts_with(&wanted), "{warning}");
+    }
 
     #[test]
     fn legs_that_were_planned_and_not_flown_are_said() {
