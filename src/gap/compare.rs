@@ -110,9 +110,8 @@ fn flyable(data: &Data, law: LeanLaw, wind_mps: [f64; 2]) -> [f64; 2] {
 const READINGS: usize = 3;
 /// As [`READ_WITHIN_MPS`], without legs: hovers hardly show what wind they were flown in. Chosen.
 const HOVERS_READ_WITHIN_MPS: f64 = 0.3;
-/// A wind that is read so near to the one that was flown in is the same, m/s. Chosen: one drone of the model leans unsteadily, so
-/// that readings of one flight scatter by 0.1 m/s whatever it was flown in, and what its closed loop does besides the closed form
-/// changes by less than 0.1 us in that.
+/// A wind that is read so near to the one that was flown in is the same, m/s. Chosen: legs tell a mean wind with a standard error
+/// of 0.1 to 0.2 m/s.
 const READ_WITHIN_MPS: f64 = 0.15;
 
 /// The wind to fly in where another was flown in before, m/s: that one, if it is the same.
