@@ -24,6 +24,8 @@ const LINEAR_DOUBT: f64 = 0.03;
 /// degrees per m/s. The fit has several minima: of two flights whose models were tried with a body besides a drag of
 /// the rotors, the deepest was found from nearly none in one, and from the usual ones in the other.
 const USUAL_LINEAR: [f64; 3] = [0.001, 0.01, 0.03];
+/// Starts are others if the square roots of their drags, in units, are further apart. Numerical.
+const OTHER_START: f64 = 0.25;
 /// A search that only finds under which start the deepest bottom is ends where two steps gain less, nats. Numerical.
 const ROUGH_NATS: f64 = 0.1;
 /// Searches from where the last one ended, at most: each has only so many steps. Numerical.
@@ -149,13 +151,17 @@ pub(super) struct Fitted {
 /// Fits the law from the model's. The search starts from the model's own linear part and from what small
 /// rotors usually have: with too small a one the wind begins far too strong.
 pub(super) fn fit(points: Vec<Point>, model: LeanLaw) -> Fitted {
+    // What does not feel the updraft is fitted once for all of them.
+    let still = LeanLaw { updraft_mps: 0.0, ..model };
+    let of = if model.feels_updraft() { model } else { still };
     let mut digest = Digest::new();
-    digest.add_debug(&(&points, model));
-    FITTED.get(digest).unwrap_or_else(|| {
-        let fitted = fitted(points, model);
+    digest.add_debug(&(&points, of));
+    let fitted = FITTED.get(digest).unwrap_or_else(|| {
+        let fitted = fitted(points, of);
         FITTED.keep(digest, fitted);
         fitted
-    })
+    });
+    Fitted { law: LeanLaw { updraft_mps: model.updraft_mps, ..fitted.law }, ..fitted }
 }
 
 fn fitted(points: Vec<Point>, model: LeanLaw) -> Fitted {
@@ -258,8 +264,10 @@ fn most_probable(leans: &Leans, model: LeanLaw, lacks: Lacks) -> ([f64; COUNT], 
     };
     let starts: Vec<f64> = match lacks {
         Lacks::Rotors => {
-            let all = [model.linear].into_iter().chain(USUAL_LINEAR);
-            all.map(|linear| linear / UNITS[DRAG]).collect()
+            let model = model.linear / UNITS[DRAG];
+            let usual = USUAL_LINEAR.map(|linear| linear / UNITS[DRAG]);
+            let is_other = |drag: &f64| (drag.sqrt() - model.sqrt()).abs() > OTHER_START;
+            [model].into_iter().chain(usual.into_iter().filter(is_other)).collect()
         }
         Lacks::Body => BODIES.map(|square| square / BODY_UNIT).to_vec(),
     };
