@@ -3,20 +3,17 @@
 //! whatever the pulses tell.
 
 use super::lean_fit::{
-    InAir, Leans, Point, SCATTER_RAD, SHEAR, SLOPE_STEP, bottom, hovering_gusts_mps, hovering_wind,
-    usable,
+    FORM_SHARE, InAir, Leans, Point, SCATTER_RAD, SHEAR, SLOPE_STEP, bottom, hovering_gusts_mps,
+    hovering_wind, usable,
 };
 use super::lean_law::LeanLaw;
-use crate::numeric::{differences_at_once, most};
+use crate::numeric::differences_at_once;
 
 /// Standard deviation of the linear part of a model's law: as a share, as bodies may differ from the model by some tenths,
 /// and rad/(m/s). Chosen.
 const LINEAR_DOUBT: (f64, f64) = (0.3, 0.003);
 /// Standard deviation of its quadratic part, as a share. Chosen likewise.
 const SQUARE_DOUBT: f64 = 0.3;
-/// Standard deviation of what a lean may differ by from the law's along the climb, as a share, for a line and a parabola: two
-/// models of the same rotor, fitted to each other over the flown speeds, differ by 3 % (rms) and up to 8 %.
-const FORM_SHARE: f64 = 0.05;
 /// Share of their likelihood, in nats, that leans count with. Leans of one bin and the next err alike, whatever a line and a
 /// parabola take up: in 18 foreign flights in less than 3 m/s of wind, the updraft in which they were likeliest was off by
 /// 1.7 times its error (rms).
@@ -30,8 +27,6 @@ const COUNT: usize = 6;
 pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
     let leans = Leans::of(points);
     let model = usable(law);
-    let climbs = leans.points.iter().map(|point| point.velocity_mps[2].abs());
-    let fastest_mps = most(climbs).unwrap_or_default().max(1.0);
     let (share, least) = LINEAR_DOUBT;
     let linear_doubt = (share * model.linear).hypot(least);
     let in_air = |at: &[f64; COUNT]| {
@@ -45,7 +40,7 @@ pub(super) fn misfit_nats(points: Vec<Point>, law: LeanLaw) -> f64 {
         (air, [gust_mps, gust_mps, SHEAR, FORM_SHARE, FORM_SHARE])
     };
     let of_form = |point: &Point, lean_rad: f64, _: f64| {
-        let along = point.velocity_mps[2] / fastest_mps;
+        let along = point.velocity_mps[2] / leans.fastest_climb_mps;
         [0.0, 0.0, 0.0, lean_rad * along, lean_rad * (2.0 * along * along - 1.0)]
     };
     let rare = |at: &[f64; COUNT]| {

@@ -90,7 +90,8 @@ impl<'a> Scenery<'a> {
             of_groups_se_mps: Vec::new(),
             mean_se_mps: told_within_mps(&comparison.data, known.wind_mps),
             air_mps: groups.iter().map(|group| group.bins.iter().map(air).collect()).collect(),
-            measured: None,
+            // With legs no candidate has to tell how the vehicle leans: neither here nor when it is flown.
+            measured: comparison.wind.measured,
         };
         let amsl_m = plan.site.ground_amsl_m;
         comparison.scene = Scene::measured(&comparison.data, &comparison.side, &wind, amsl_m);
@@ -194,5 +195,30 @@ impl<'a> Scenery<'a> {
             }
         }
         Ok(Some(light))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Role;
+    use crate::gap::verdict::Verdict;
+    use crate::mission::resolve::resolve;
+    use crate::vehicle::library::builtin;
+
+    #[test]
+    fn who_leans_otherwise_reads_another_wind_only_where_no_leg_tells_it() {
+        let model = builtin("airsim-generic-quad").unwrap();
+        let known = Known::new(&Verdict::default(), model.clone(), [3.0, 0.0]);
+        let mut drags = model;
+        Role::BodyDragSide.set(&mut drags, 0.2);
+        for (template, reads_another) in
+            [("calibration", true), ("calibration-counterphase", false)]
+        {
+            let plan = resolve(template, &[]).unwrap().flights.remove(0).plan;
+            let flight = Flight::new(&known, plan).unwrap();
+            let scenery = Scenery::new(&known, &flight, false, false).unwrap();
+            assert_eq!(scenery.comparison.leans_otherwise(&drags), reads_another, "{template}");
+        }
     }
 }
