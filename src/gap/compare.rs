@@ -61,6 +61,10 @@ pub struct Comparison {
     read_by: LeanLaw,
     /// Air that the simulated side was flown in, show frame, z up, m/s.
     pub(super) flown_mps: [f64; 3],
+    /// Updraft that it was flown for, m/s, in one that is nearly the same.
+    of_updraft_mps: f64,
+    /// Mean drone that flew it: this one, but for sizes that are nearly the same.
+    flew: Vehicle,
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
@@ -120,6 +124,32 @@ fn beside([x_mps, y_mps, _]: [f64; 3], read_mps: [f64; 2]) -> [f64; 2] {
     if apart_mps < READ_WITHIN_MPS { [x_mps, y_mps] } else { read_mps }
 }
 
+/// Updrafts in which models are flown are so far apart, m/s. Chosen: what the closed loop does besides the closed form, a few
+/// microseconds, is the same within a twentieth in half of this; the closed form itself is that of the updraft in between.
+const FLOWN_EACH_MPS: f64 = 0.125;
+/// Sizes of effects that differ by no more than this share fly the same, but for what the closed form tells of them. Chosen likewise.
+const FLOWN_SIZE: f64 = 0.02;
+
+/// The updraft to fly in instead of one, m/s.
+fn flown_beside(updraft_mps: f64) -> f64 {
+    (updraft_mps / FLOWN_EACH_MPS).round() * FLOWN_EACH_MPS
+}
+
+/// Whether two vehicles differ in nothing but sizes that are nearly the same.
+fn fly_alike(one: &Vehicle, other: &Vehicle) -> bool {
+    let mut moved = one.clone();
+    for (name, table) in &mut moved.effects {
+        let Some(there) = other.effects.get(name) else { continue };
+        for (name, value) in &mut table.parameters {
+            let near = there.parameters.get(name);
+            if let Some(there) = near.filter(|to| (**to - *value).abs() < FLOWN_SIZE * to.abs()) {
+                *value = *there;
+            }
+        }
+    }
+    moved == *other
+}
+
 impl Comparison {
     /// Flies (or takes) the simulated side of a vehicle.
     ///
@@ -153,7 +183,7 @@ impl Comparison {
         let law = lean_law(&vehicle, amsl_m, updraft_mps);
         // Logs of another simulation, and closed forms, are in still air.
         let flown_updraft_mps =
-            if matches!(simulated, Simulated::Refly(_)) { updraft_mps } else { 0.0 };
+            if matches!(simulated, Simulated::Refly(_)) { flown_beside(updraft_mps) } else { 0.0 };
         let air = |[x_mps, y_mps]: [f64; 2]| [x_mps, y_mps, flown_updraft_mps];
         let first = air(match simulated {
             Simulated::Given { values, flew, is_foreign: true } => {
@@ -216,8 +246,18 @@ impl Comparison {
                 air(beside(first, flyable(data, law, read_mps)))
             }
         };
-        let mut values;
-        (flown_mps, values) = fly(flown_mps)?;
+        let mut alike = near.filter(|near| near.flew_alike(data, &vehicle, flown_mps));
+        let mut values = match alike {
+            Some(near) => {
+                flown_mps = near.flown_mps;
+                near.side.iter().map(|group| group.iter().copied().map(Some).collect()).collect()
+            }
+            None => {
+                let values;
+                (flown_mps, values) = fly(flown_mps)?;
+                values
+            }
+        };
         // What legs lack of their steady lean depends on the wind that they were flown in, and so does what hovers lack of
         // it after a climb or a descent at the end of what the vehicle can lean.
         let rounds = if matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
@@ -253,6 +293,8 @@ impl Comparison {
         if let Some(best) = nearest {
             (flown_mps, values) = (best.flown_mps, best.values);
         }
+        // The other flight was in another wind than this one is read to have been in.
+        alike = alike.filter(|near| near.flown_mps == flown_mps);
         let has = |group: usize, bin: usize| values[group][bin].is_some();
         let data = data.keep(has);
         let mut side = flat(&values);
@@ -278,15 +320,15 @@ impl Comparison {
                 }
             }
         }
-        let closure_us = side
-            .iter()
-            .enumerate()
-            .map(|(group, bins)| {
-                let apart =
-                    |(bin, values): (usize, &BinValues)| values.pulse_us - closed.at(group, 0, bin);
-                bins.iter().enumerate().map(apart).collect()
-            })
-            .collect();
+        let apart = |(group, bins): (usize, &Vec<BinValues>)| {
+            let apart =
+                |(bin, values): (usize, &BinValues)| values.pulse_us - closed.at(group, 0, bin);
+            bins.iter().enumerate().map(apart).collect()
+        };
+        let closure_us = match alike {
+            Some(near) => near.closure_us.clone(),
+            None => side.iter().enumerate().map(apart).collect(),
+        };
         let is_foreign = matches!(simulated, Simulated::Given { is_foreign: true, .. });
         let mut comparison = Self {
             data,
@@ -295,6 +337,8 @@ impl Comparison {
             wind: blown,
             read_by: law,
             flown_mps,
+            of_updraft_mps: updraft_mps,
+            flew: alike.map_or_else(|| vehicle.clone(), |near| near.flew.clone()),
             closure_us,
             felt: Vec::new(),
             amsl_m,
@@ -309,6 +353,23 @@ impl Comparison {
             comparison.other_wind_mps = Some([flown_mps[0], flown_mps[1]]);
         }
         Ok(comparison)
+    }
+
+    /// Whether this was flown for the same logs by nearly the same vehicle, in the air that another is to fly in, show frame, m/s.
+    fn flew_alike(&self, data: &Data, vehicle: &Vehicle, air_mps: [f64; 3]) -> bool {
+        let [x_mps, y_mps, updraft_mps] = air_mps;
+        let is_same_fleet = || {
+            let (own, others) = (&self.data.groups, &data.groups);
+            own.len() == others.len()
+                && own.iter().zip(others).all(|(own, other)| {
+                    own.slots == other.slots && own.bins.len() == other.bins.len()
+                })
+        };
+        self.is_flown
+            && self.flown_mps[2] == updraft_mps
+            && beside(self.flown_mps, [x_mps, y_mps]) == self.flown_mps[..2]
+            && is_same_fleet()
+            && fly_alike(vehicle, &self.flew)
     }
 
     /// This comparison in a flight that is in an updraft all over, m/s, with the wind that the leans tell there.
@@ -465,6 +526,8 @@ impl Comparison {
             wind,
             read_by: self.read_by,
             flown_mps: self.flown_mps,
+            of_updraft_mps: self.of_updraft_mps,
+            flew: self.flew.clone(),
             closure_us: pick(&self.closure_us, &keep),
             felt: pick(&self.felt, &keep),
             amsl_m: self.amsl_m,
@@ -535,7 +598,7 @@ impl Comparison {
             if !self.is_flown || !self.reads_wind(&self.vehicle) {
                 return 0.0;
             }
-            let law = lean_law(&self.vehicle, self.amsl_m, self.flown_mps[2]);
+            let law = lean_law(&self.vehicle, self.amsl_m, self.of_updraft_mps);
             lean::misfit_nats(&self.data, law, (&self.side, self.flown_mps))
         })
     }

@@ -16,8 +16,12 @@ use crate::base::rng::{Purpose, stream};
 /// Candidates this near to the best by the quick scan are fitted with their own noise, nats. 7 before the
 /// scatter between drones took part, which can turn ranks round; chosen. More costs only time.
 const NEAR_NATS: f64 = 20.0;
+/// What gains less at once is not fitted, nats. Chosen: nothing.
+const LEAST_GAIN_NATS: f64 = 0.5;
 /// At most this many are fitted. Chosen for time.
 const MOST_FITTED: usize = 8;
+/// Free shapes that are fitted. Chosen for time.
+const SHAPES_FITTED: usize = 3;
 /// Forms of one effect that are fitted: which explains more, the noise decides as well.
 const FORMS_FITTED: usize = 2;
 /// A multiple of the effect's tried form beyond this is another effect: closed forms are not linear over
@@ -116,30 +120,71 @@ pub(super) fn round(
 /// Looks once, where the noise without what is sought is known.
 pub(super) fn round_on(
     problem: &Problem<'_>,
-    first: Based,
+    mut first: Based,
     sought: Sought<'_>,
     settles: bool,
 ) -> Round {
+    // What leads at once is asked first where the noise is likelier: all others are fitted once.
+    for _ in 0..BETTER_STARTS {
+        let there = problem.among(&first.0);
+        let (effect, shape) = leaders(&there, &first.1, sought, settles);
+        let Some(better) = better(&there, &first.1, (&effect, &shape), settles) else { break };
+        first = better;
+    }
     let mut found = round_from(problem, first, sought, settles);
     for _ in 0..BETTER_STARTS {
-        // The noise has more than one likeliest place, and what a candidate leads to may be better for none, too.
-        let by_effect = found.library.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
-        let by_shape = found.generics.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
-        let best = by_effect.map(|one| (one.gain, &one.noise)).into_iter();
-        let best = best.chain(by_shape.map(|one| (one.gain, &one.noise)));
-        let Some((gain, noise)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-        if gain < FLOOR_NATS {
-            break;
-        }
         let groups = found.groups.clone();
         let there = problem.among(&groups);
-        let again = based(&there, noise, settles);
-        if again.1.log_posterior() < found.base.log_posterior() + BETTER_NATS {
-            break;
-        }
+        let all = (&found.library[..], &found.generics[..]);
+        let Some(again) = better(&there, &found.base, all, settles) else { break };
         found = round_from(&there, again, sought, settles);
     }
     found
+}
+
+/// The effect and the free shape that gain most in the noise as it is, fitted with their own.
+fn leaders(
+    problem: &Problem<'_>,
+    base: &Solution,
+    sought: Sought<'_>,
+    settles: bool,
+) -> (Vec<Ranked>, Vec<RankedGeneric>) {
+    let before = base.log_posterior();
+    rayon::join(
+        || {
+            let first =
+                scan(base, sought).into_iter().next().filter(|one| one.gain > LEAST_GAIN_NATS);
+            first
+                .map(|one| refit(problem, base, before, &one, sought, settles))
+                .into_iter()
+                .collect()
+        },
+        || {
+            let first = shapes_at_once(base, sought).into_iter().next();
+            first
+                .map(|one| refit_shape(problem, base, before, &one, sought, settles))
+                .into_iter()
+                .collect()
+        },
+    )
+}
+
+/// A likelier noise with nothing of what is sought, from the noise of what gains most: it has more than one likeliest place, and what
+/// a candidate leads to may be better for none, too. `None`: that one is no better.
+fn better(
+    problem: &Problem<'_>,
+    base: &Solution,
+    (effects, shapes): (&[Ranked], &[RankedGeneric]),
+    settles: bool,
+) -> Option<Based> {
+    let effects = effects.iter().map(|one| (one.gain, &one.noise));
+    let all = effects.chain(shapes.iter().map(|one| (one.gain, &one.noise)));
+    let (gain, noise) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if gain < FLOOR_NATS {
+        return None;
+    }
+    let again = based(problem, noise, settles);
+    (again.1.log_posterior() >= base.log_posterior() + BETTER_NATS).then_some(again)
 }
 
 /// How often a better place of the noise is taken up. Numerical.
@@ -169,7 +214,7 @@ fn round_from(
     let problem = &problem.among(&groups);
     let mut library = scan(&base, sought);
     let best = library.first().map_or(0.0, |best| best.gain);
-    let near = |ranked: &Ranked| ranked.gain > 0.5 && ranked.gain > best - NEAR_NATS;
+    let near = |ranked: &Ranked| ranked.gain > LEAST_GAIN_NATS && ranked.gain > best - NEAR_NATS;
     let count = library.iter().take(MOST_FITTED).filter(|ranked| near(ranked)).count();
     let before = base.log_posterior();
     let fitted: Vec<Ranked> = library
@@ -301,13 +346,8 @@ pub(super) fn feeling(
     groups
 }
 
-fn free_shapes(
-    problem: &Problem<'_>,
-    base: &Solution,
-    before: f64,
-    sought: Sought<'_>,
-    settles: bool,
-) -> Vec<RankedGeneric> {
+/// The best free shape of each kind in the noise as it is, best first.
+fn shapes_at_once(base: &Solution, sought: Sought<'_>) -> Vec<RankedGeneric> {
     let mut best: Vec<RankedGeneric> = Vec::new();
     for (index, generic) in sought.generics.iter().enumerate() {
         let (beta, nats) = base.gain_of_all(&generic.columns);
@@ -331,47 +371,67 @@ fn free_shapes(
         }
     }
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    best
+}
+
+fn refit_shape(
+    problem: &Problem<'_>,
+    base: &Solution,
+    before: f64,
+    found: &RankedGeneric,
+    sought: Sought<'_>,
+    settles: bool,
+) -> RankedGeneric {
+    if found.gain < LEAST_GAIN_NATS {
+        return found.clone();
+    }
+    let generic = &sought.generics[found.generic];
+    let problem = problem.with(&generic.columns);
+    let mut with = problem.fit(base, Likelihood::Profile);
+    let first = with.beta.len() - generic.columns.len();
+    if settles {
+        with = settled(&problem, with, |_| problem.groups.to_vec()).1;
+    }
+    let plain = found.plain.max(with.log_posterior() - before - generic.penalty);
+    let felt: Vec<_> = generic.felt.iter().map(Vec::as_slice).collect();
+    let feeling = |beta: &[f64]| feeling(problem.groups, &felt, &beta[first..]);
+    if !felt.is_empty() {
+        let numb = with.clone();
+        with = if settles {
+            settled(&problem, with, feeling).1
+        } else {
+            problem.among(&feeling(&with.beta)).fit(&with, Likelihood::Profile)
+        };
+        // What it does to the scatter is known by its size, which means alone may hardly tell.
+        if numb.log_posterior() > with.log_posterior() {
+            with = numb;
+        }
+    }
+    let gain = with.log_posterior() - before - generic.penalty;
+    if gain < found.gain {
+        return RankedGeneric { plain, ..found.clone() };
+    }
+    RankedGeneric {
+        gain,
+        plain,
+        beta: with.beta[first..].to_vec(),
+        noise: Start::from(&with),
+        ..found.clone()
+    }
+}
+
+fn free_shapes(
+    problem: &Problem<'_>,
+    base: &Solution,
+    before: f64,
+    sought: Sought<'_>,
+    settles: bool,
+) -> Vec<RankedGeneric> {
+    let mut best = shapes_at_once(base, sought);
     let refitted: Vec<RankedGeneric> = best
         .par_iter()
-        .take(3)
-        .map(|found| {
-            if found.gain < 0.5 {
-                return found.clone();
-            }
-            let generic = &sought.generics[found.generic];
-            let problem = problem.with(&generic.columns);
-            let mut with = problem.fit(base, Likelihood::Profile);
-            let first = with.beta.len() - generic.columns.len();
-            if settles {
-                with = settled(&problem, with, |_| problem.groups.to_vec()).1;
-            }
-            let plain = found.plain.max(with.log_posterior() - before - generic.penalty);
-            let felt: Vec<_> = generic.felt.iter().map(Vec::as_slice).collect();
-            let feeling = |beta: &[f64]| feeling(problem.groups, &felt, &beta[first..]);
-            if !felt.is_empty() {
-                let numb = with.clone();
-                with = if settles {
-                    settled(&problem, with, feeling).1
-                } else {
-                    problem.among(&feeling(&with.beta)).fit(&with, Likelihood::Profile)
-                };
-                // What it does to the scatter is known by its size, which means alone may hardly tell.
-                if numb.log_posterior() > with.log_posterior() {
-                    with = numb;
-                }
-            }
-            let gain = with.log_posterior() - before - generic.penalty;
-            if gain < found.gain {
-                return RankedGeneric { plain, ..found.clone() };
-            }
-            RankedGeneric {
-                gain,
-                plain,
-                beta: with.beta[first..].to_vec(),
-                noise: Start::from(&with),
-                ..found.clone()
-            }
-        })
+        .take(SHAPES_FITTED)
+        .map(|found| refit_shape(problem, base, before, found, sought, settles))
         .collect();
     best.splice(..refitted.len(), refitted);
     for found in &mut best {

@@ -214,7 +214,7 @@ impl Search<'_> {
                 break;
             };
             let step_mps = (here.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-            if step_mps.abs() < UPDRAFT_SETTLED_MPS {
+            if step_mps.abs() < FAR_STEP.ends_mps {
                 break;
             }
             let gone = match self.goes_to(at_mps + step_mps, nats)? {
