@@ -6,7 +6,7 @@ use super::bins::of_segments;
 use super::data::{Data, Flown};
 use super::explain::Found;
 use super::make::Input;
-use super::verdict::{Gap, is_strong_wind};
+use super::verdict::{Gap, Step, is_strong_wind};
 use super::words::short;
 use crate::base::said::said_in_files;
 use crate::effects::Role;
@@ -321,7 +321,7 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         let wind = &found.comparison.wind;
         let wind_mps = wind.mean_mps[0].hypot(wind.mean_mps[1]);
         let is_by_lean = wind.measured.is_none() && wind.mean_se_mps > 0.0;
-        if is_by_lean && input.simulated.is_none() && wind_mps >= WINDY_MPS {
+        if is_by_lean && input.simulated.is_none() && is_doubted(wind_mps, &found.steps) {
             let has_lost_legs = !data.has_legs() && has_legs(plan);
             warnings.push(Warning::WindByLean { wind_mps, has_lost_legs });
         }
@@ -330,6 +330,17 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings
+}
+
+/// Whether a wind that leans alone tell is doubted aloud: it is strong, or drag was found, by which a strong wind is read as hardly any.
+fn is_doubted(wind_mps: f64, steps: &[Step]) -> bool {
+    wind_mps >= WINDY_MPS || steps.iter().any(is_drag)
+}
+
+/// Whether a finding leans drones by what it does: drag of the rotors or the body, or air that gives up its momentum.
+fn is_drag(step: &Step) -> bool {
+    const DRAGS: [Role; 3] = [Role::RotorDrag, Role::MomentumDrag, Role::BodyDragSide];
+    step.finding.effects().iter().any(|effect| DRAGS.iter().any(|drag| drag.is_of(effect)))
 }
 
 /// Whether so little of a plan's steady flight is compared that it must be said.
@@ -377,7 +388,7 @@ fn groups_lost(plan: &Plan, data: &Data) -> Vec<Warning> {
 mod tests {
     use super::*;
     use crate::gap::trial;
-    use crate::gap::verdict::{Shrink, Verdict, WindFound};
+    use crate::gap::verdict::{Finding, Shrink, Verdict, WindFound};
     use crate::mission::resolve::resolve;
 
     #[test]
@@ -407,6 +418,18 @@ mod tests {
         assert!(said(false).starts_with("no horizontal leg tells the wind: 9.2 m/s are read"));
         assert!(said(false).ends_with("(calibration-counterphase has legs)"), "{}", said(false));
         assert!(said(true).ends_with("could not fly them in this air: fly in less wind)"));
+    }
+
+    #[test]
+    fn a_weak_wind_is_doubted_where_drag_is_found() {
+        let doubted = |wind_mps: f64, effects: &[&str]| {
+            let effects = effects.iter().map(|effect| (*effect).to_owned()).collect();
+            let class = Finding::Class { effects, parameters: Vec::new() };
+            is_doubted(wind_mps, &[trial::step(class, 20.0, &[])])
+        };
+        assert!(doubted(0.6, &["rotor-inflow", "parasitic-drag"]));
+        assert!(doubted(0.6, &["blade-flapping", "momentum-drag"]));
+        assert!(!doubted(0.6, &["battery"]) && doubted(3.5, &["battery"]));
     }
 
     #[test]

@@ -101,9 +101,25 @@ pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, Workf
     let published = published.map(str::to_lowercase);
     let given = || game.as_ref().map(|game| game.truth_sha256.clone());
     let beside = seal::published(folder).ok();
-    let truth_sha256 = published.unwrap_or_else(|| most_told([recorded, given(), beside]));
+    let told = most_told([recorded, given(), beside]);
     let mut checks = Checks { folder, made: Vec::new() };
-    checks.seal(&truth_sha256);
+    let is_whole = || seal::truth_sha256(folder).is_ok_and(|found| found == told);
+    let truth_sha256 = match published {
+        // Files that agree with one another are not each altered.
+        Some(published) if published != told && is_whole() => {
+            let problem = format!(
+                "has the SHA-256 {told}, as all of this game says, and not {published}, which was given: that is of another \
+                 game, or this one was exchanged as a whole"
+            );
+            checks.add(&seal::truth_path(folder), "", Some(problem));
+            told
+        }
+        published => {
+            let truth_sha256 = published.unwrap_or(told);
+            checks.seal(&truth_sha256);
+            truth_sha256
+        }
+    };
     if let Some(game) = &game {
         checks.game(game, record.as_ref(), &truth_sha256);
         checks.flight(game);

@@ -211,7 +211,8 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     // A forgery that fits in itself does not fit what was published.
     let other = "ab".repeat(32);
     let ended = bench.expect(4, &["blind", "verify", "game", "--sha256", &other]);
-    assert!(ended.out.contains(&format!("published was {other}")), "{ended}");
+    assert!(ended.out.contains(&format!("and not {other}, which was given")), "{ended}");
+    assert_eq!(ended.out.matches("WRONG  ").count(), 1, "all of it belongs together: {ended}");
     bench.expect(0, &["blind", "verify", "game"]);
     // The record is not given again for a flight that is no longer the one it was made of.
     let before = swap(&bench, "game/flight/plan.json", "{", "{ ");
