@@ -247,17 +247,14 @@ impl Comparison {
             }
         };
         let mut alike = near.filter(|near| near.flew_alike(data, &vehicle, flown_mps));
-        let mut values = match alike {
-            Some(near) => {
-                flown_mps = near.flown_mps;
-                near.side.iter().map(|group| group.iter().copied().map(Some).collect()).collect()
-            }
-            None => {
-                let values;
-                (flown_mps, values) = fly(flown_mps)?;
-                values
-            }
-        };
+        let mut values: Side;
+        if let Some(near) = alike {
+            flown_mps = near.flown_mps;
+            let some = |group: &Vec<BinValues>| group.iter().copied().map(Some).collect();
+            values = near.side.iter().map(some).collect();
+        } else {
+            (flown_mps, values) = fly(flown_mps)?;
+        }
         // What legs lack of their steady lean depends on the wind that they were flown in, and so does what hovers lack of
         // it after a climb or a descent at the end of what the vehicle can lean.
         let rounds = if matches!(simulated, Simulated::Refly(_)) { READINGS } else { 0 };
@@ -855,8 +852,49 @@ fn rectified(
 
 #[cfg(test)]
 mod tests {
+    use super::super::bins::of_segments;
+    use super::super::data::PlannedPart;
+    use super::super::refly::refly;
     use super::super::trial;
     use super::*;
+    use crate::mission::resolve::resolve;
+
+    #[test]
+    fn a_flight_of_nearly_the_same_vehicle_in_nearly_the_same_updraft_stands_for_its_own() {
+        let plan = resolve("calibration", &[]).unwrap().flights.remove(0).plan;
+        let slot = &plan.slots[0];
+        let bins = of_segments(&plan.groups[0].segments);
+        let vehicle = |inflow_share: f64| {
+            let mut vehicle = trial::vehicle();
+            Role::InflowShare.set(&mut vehicle, inflow_share);
+            vehicle
+        };
+        let flown = |inflow_share: f64, updraft_mps: f64, near: Option<&Comparison>| {
+            let vehicle = vehicle(inflow_share);
+            let air_mps = [0.0, 0.0, updraft_mps];
+            let values =
+                refly(&vehicle, &plan, slot, &bins, air_mps, thrust_exponent(&vehicle)).unwrap();
+            let name = plan.groups[0].name.clone();
+            let part = PlannedPart { name, slots: vec![slot], bins: &bins, values: &values };
+            let (data, simulated) =
+                (Data::planned(&plan, &[part], |_, _| f64::NAN), Simulated::Refly(&plan));
+            Comparison::of(&data, &vehicle, &simulated, Some(&plan), updraft_mps, near).unwrap()
+        };
+        let first = flown(0.3, 0.0, None);
+        for (inflow_share, updraft_mps, stands) in
+            [(0.303, 0.06, true), (0.33, 0.06, false), (0.303, 0.07, false)]
+        {
+            let there = flown(inflow_share, updraft_mps, Some(&first));
+            let by = format!("{inflow_share} in {updraft_mps} m/s");
+            assert_eq!(there.closure_us == first.closure_us, stands, "{by}");
+            assert_eq!(there.scene.updraft_mps, updraft_mps);
+            // What was flown in just this updraft leaves hardly anything.
+            let residual = there.residual(&there.vehicle, 0.0).unwrap();
+            let most_us = most(residual[0][0].iter().map(|rest_us| rest_us.abs())).unwrap();
+            assert!(most_us < 0.3, "{by}: {most_us} us");
+            assert!(there.raw_gap_us().unwrap() < 0.1, "{by}: {} us", there.raw_gap_us().unwrap());
+        }
+    }
 
     #[test]
     fn who_leans_otherwise_leant_in_another_wind() {
