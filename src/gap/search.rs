@@ -16,7 +16,7 @@ use crate::base::rng::{Purpose, stream};
 /// Candidates this near to the best by the quick scan are fitted with their own noise, nats. 7 before the
 /// scatter between drones took part, which can turn ranks round; chosen. More costs only time.
 const NEAR_NATS: f64 = 20.0;
-/// What gains less at once is not fitted, nats. Chosen: nothing.
+/// What gains less at once is not fitted, nats. Chosen: next to nothing beside a threshold.
 const LEAST_GAIN_NATS: f64 = 0.5;
 /// At most this many are fitted. Chosen for time.
 const MOST_FITTED: usize = 8;

@@ -214,7 +214,7 @@ impl Search<'_> {
                 break;
             };
             let step_mps = (here.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-            if step_mps.abs() < FAR_STEP.ends_mps {
+            if step_mps.abs() < HARDLY_TOLD_MPS {
                 break;
             }
             let gone = match self.goes_to(at_mps + step_mps, nats)? {
@@ -598,12 +598,14 @@ const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 pub(super) const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
-/// How the updraft of the likeliest flight is found: down to half of what a flight tells of it at best. Numerical.
-const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.03, parabolas: 6 };
+/// Half of what a flight tells of its updraft at best, m/s. Chosen.
+const HARDLY_TOLD_MPS: f64 = 0.03;
+/// How the updraft of the likeliest flight is found. Numerical.
+const FAR_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: HARDLY_TOLD_MPS, parabolas: 6 };
 /// The same with what was found already: rougher, as all sizes are fitted anew where it leads to.
 const ROUGH_STEP: StepMps = StepMps { begins_mps: 0.5, ends_mps: 0.12, parabolas: 6 };
 /// The same where the model itself is nearest: what is likeliest farther away than two steps is found from afar.
-const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: 0.03, parabolas: 3 };
+const NEAR_STEP: StepMps = StepMps { begins_mps: 0.06, ends_mps: HARDLY_TOLD_MPS, parabolas: 3 };
 /// What cannot be flown is as unlikely as this.
 const NOWHERE: f64 = f64::NEG_INFINITY;
 /// A flight that is less likely than what was found by this much is not looked for elsewhere, nats. Chosen: of 27 that were in
